@@ -1,0 +1,59 @@
+//! What can go wrong with a file, and what can be odd about one that is read all the same.
+
+use hither::scene::Scene;
+use std::path::PathBuf;
+
+/// Why a file was not read or written. The text is one line for the user: what, where, what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The operating system refused.
+    #[error("{}: {action}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was tried, for example `cannot read`.
+        action: &'static str,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is not what its format demands.
+    #[error("{}: {message}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and what to do.
+        message: String,
+    },
+    /// The file is sound but needs something that is not supported.
+    #[error("{}: {message}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What it needs, and what to do.
+        message: String,
+    },
+}
+
+/// Something odd in a file that was read all the same; one line for the user.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// Which part of the file, for example `mesh 2 "chair"`.
+    pub place: String,
+    /// What was odd and what was done about it.
+    pub message: String,
+}
+
+impl std::fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.place, self.message)
+    }
+}
+
+/// A scene as read, and what was odd about its file (each thing once).
+#[derive(Debug)]
+pub struct Loaded {
+    /// The scene; it passes [`Scene::validate`].
+    pub scene: Scene,
+    /// Oddities, each once.
+    pub diagnostics: Vec<Diagnostic>,
+}

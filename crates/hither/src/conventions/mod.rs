@@ -1,0 +1,170 @@
+//! The agreements every room relies on, stated once.
+//!
+//! - World: right-handed, +Y up, metres, counter-clockwise front faces (glTF's). A view looks down −Z.
+//! - Images: +y down, pixel centres at +0.5, half-open rectangles.
+//! - Depth: [`Projection`] says how it is made. Larger is nearer, it is linear across the screen, and 0 is
+//!   "nothing there". A pyramid keeps the farthest, that is the smallest.
+//! - Fill rule: top-left, on coordinates snapped to 1/256 pixel ([`SUBPIXEL`]), so that a shared edge is
+//!   drawn exactly once.
+//! - A tie in depth goes to the smaller instance, then to the smaller triangle, whatever the drawing order.
+//! - Matrices name both ends: `view_from_world * point_in_world`.
+//! - Colours are linear and premultiplied inside; sRGB only at the file.
+
+use glam::{DAffine3, DMat3, DVec3};
+
+/// Snapped screen coordinates are whole multiples of `1 / SUBPIXEL` pixel.
+pub const SUBPIXEL: i32 = 256;
+
+/// The largest image side, in pixels. Keeps snapped edge functions exact (see `raster`).
+pub const MAX_IMAGE_SIDE: u32 = 16_384;
+
+/// The id of "no instance" and "no triangle" in a picture.
+pub const NO_ID: u32 = u32::MAX;
+
+/// What is seen at a pixel: an instance, and a triangle within that instance's mesh.
+///
+/// Instances are numbered depth-first through the scene's nodes, one a node with a mesh; triangles in
+/// the order of the mesh. The derived order is the tie rule for equal depths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SurfaceId {
+    /// Index of the instance in the scene's depth-first order.
+    pub instance: u32,
+    /// Index of the triangle in the instance's mesh.
+    pub triangle: u32,
+}
+
+/// How points in view space reach the screen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// A pinhole. Depth is `near / distance`, in (0, 1]; there is no far plane.
+    Perspective {
+        /// Full vertical field of view, radians, in (0, π).
+        fov_y: f64,
+        /// Distance of the near plane, metres, > 0.
+        near: f64,
+    },
+    /// Parallel rays along −Z. Depth is `(far − distance) / (far − near)`, in (0, 1], which is linear
+    /// across the screen where `near / distance` would not be; what lies beyond `far` is not seen.
+    Orthographic {
+        /// Half the height of the view, metres, > 0. (Half the width follows from the aspect ratio.)
+        half_height: f64,
+        /// Distance of the near plane, metres; may be zero or negative.
+        near: f64,
+        /// Distance of the far plane, metres, > near.
+        far: f64,
+    },
+}
+
+impl Projection {
+    /// Distance of the near plane along the view axis, metres.
+    pub fn near(&self) -> f64 {
+        match *self {
+            Projection::Perspective { near, .. } | Projection::Orthographic { near, .. } => near,
+        }
+    }
+
+    /// Distance along the view axis, metres, of a surface at `depth`; +∞ where `depth` is 0.
+    pub fn distance(&self, depth: f32) -> f64 {
+        if depth <= 0.0 {
+            return f64::INFINITY;
+        }
+        match *self {
+            Projection::Perspective { near, .. } => near / f64::from(depth),
+            Projection::Orthographic { near, far, .. } => far - f64::from(depth) * (far - near),
+        }
+    }
+}
+
+/// An eye and the image it looks at: everything a picture depends on besides the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Rigid transform from world to view space (right-handed, looking down −Z, +Y up).
+    pub view_from_world: DAffine3,
+    /// How view space reaches the screen. Pixels are square.
+    pub projection: Projection,
+    /// Image width, pixels, 1 to [`MAX_IMAGE_SIDE`].
+    pub width: u32,
+    /// Image height, pixels, 1 to [`MAX_IMAGE_SIDE`].
+    pub height: u32,
+}
+
+/// Why a [`View`] cannot be drawn.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ViewError {
+    /// A side is zero or above [`MAX_IMAGE_SIDE`].
+    #[error("an image of {width}x{height} pixels cannot be drawn; each side must be from 1 to 16384")]
+    Size {
+        /// Width asked for, pixels.
+        width: u32,
+        /// Height asked for, pixels.
+        height: u32,
+    },
+    /// The pose, field of view or clipping distances are not finite or out of range.
+    #[error("the camera cannot be used: {0}")]
+    Camera(&'static str),
+}
+
+impl View {
+    /// A view from `eye` towards `target`. `up` need not be perpendicular to the line of sight; where it
+    /// is parallel to it, another direction is chosen.
+    pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, projection: Projection, size: (u32, u32)) -> View {
+        let forward = (target - eye).normalize_or(DVec3::NEG_Z);
+        let right = forward
+            .cross(up.normalize_or(DVec3::Y))
+            .try_normalize()
+            .unwrap_or_else(|| forward.any_orthonormal_vector());
+        let true_up = right.cross(forward);
+        let rotation = DMat3::from_cols(right, true_up, -forward).transpose();
+        View {
+            view_from_world: DAffine3 { matrix3: rotation.into(), translation: rotation * -eye },
+            projection,
+            width: size.0,
+            height: size.1,
+        }
+    }
+
+    /// The eye in world space (for an orthographic view, a point on its axis at distance 0).
+    pub fn eye_in_world(&self) -> DVec3 {
+        self.view_from_world.inverse().translation
+    }
+
+    /// Pixels a unit of view-space width covers at distance 1 (perspective) or at any distance
+    /// (orthographic).
+    pub fn pixels_per_unit(&self) -> f64 {
+        let half_height = match self.projection {
+            Projection::Perspective { fov_y, .. } => (fov_y * 0.5).tan(),
+            Projection::Orthographic { half_height, .. } => half_height,
+        };
+        f64::from(self.height) * 0.5 / half_height
+    }
+
+    /// Checks size, pose and projection; call it where a view comes from outside.
+    pub fn validate(&self) -> Result<(), ViewError> {
+        let side = 1..=MAX_IMAGE_SIDE;
+        if !side.contains(&self.width) || !side.contains(&self.height) {
+            return Err(ViewError::Size { width: self.width, height: self.height });
+        }
+        if !self.view_from_world.is_finite() {
+            return Err(ViewError::Camera("its position and direction must be finite numbers"));
+        }
+        match self.projection {
+            Projection::Perspective { fov_y, near } => {
+                if !(fov_y > 0.0 && fov_y < std::f64::consts::PI) {
+                    return Err(ViewError::Camera("its field of view must be between 0 and 180 degrees"));
+                }
+                if !(near > 0.0 && near.is_finite()) {
+                    return Err(ViewError::Camera("its near plane must be a finite distance above 0"));
+                }
+            }
+            Projection::Orthographic { half_height, near, far } => {
+                if !(half_height > 0.0 && half_height.is_finite()) {
+                    return Err(ViewError::Camera("the height of its view must be finite and above 0"));
+                }
+                if !(near.is_finite() && far.is_finite() && far > near) {
+                    return Err(ViewError::Camera("its far plane must lie beyond its near plane"));
+                }
+            }
+        }
+        Ok(())
+    }
+}

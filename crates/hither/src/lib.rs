@@ -1,0 +1,24 @@
+//! Hither: a visibility engine.
+//!
+//! For a 3D scene and an eye it answers *what can be seen*, *in what order*, and *how it looks*.
+//! The crate opens no file, no device and no socket, and prints nothing; `hither-io` reads and writes files.
+//!
+//! Rooms, from the ground up (a room uses only rooms below it; `cargo xtask tidy` checks):
+//! [`conventions`], [`geometry`], [`scene`], [`index`] and [`raster`], [`render`];
+//! [`reference`](mod@reference) is the brute-force truth that every fast answer is tested against.
+#![forbid(unsafe_code)]
+
+pub mod conventions;
+pub mod geometry;
+pub mod index;
+pub mod raster;
+pub mod reference;
+pub mod render;
+pub mod scene;
+
+pub use index::{IndexOptions, SceneIndex};
+pub use render::{Algorithm, Frame, RenderOptions, Renderer, render};
+pub use scene::Scene;
+
+/// The engine's version, as JSON reports state it.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");

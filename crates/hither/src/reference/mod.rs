@@ -1,0 +1,1 @@
+//! Brute-force truth: slow, obvious, sharing no code with the fast paths.
