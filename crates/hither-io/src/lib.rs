@@ -5,6 +5,8 @@
 //! No reader trusts a number in a file: memory is only asked for what the file's own length can fill.
 #![forbid(unsafe_code)]
 
+mod atomic;
 mod error;
 
+pub use atomic::{check_writable, write_whole};
 pub use error::{Diagnostic, Error, Loaded};
