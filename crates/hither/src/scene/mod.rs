@@ -12,12 +12,14 @@ mod camera;
 mod material;
 mod mesh;
 mod nodes;
+mod sample;
 
 pub use animation::{Animation, Channel, Interpolation, Property};
 pub use camera::{Camera, CameraProjection};
 pub use material::{AlphaMode, Filter, Material, Texture, TextureRef, Wrap};
 pub use mesh::{Mesh, Primitive};
 pub use nodes::{Content, Group, Instance, Node, Transform};
+pub use sample::{LINEAR_FROM_SRGB, Surface};
 
 use crate::geometry::Aabb;
 use glam::DAffine3;
