@@ -7,6 +7,21 @@
 
 mod atomic;
 mod error;
+mod format;
+mod gltf;
 
 pub use atomic::{check_writable, write_whole};
 pub use error::{Diagnostic, Error, Loaded};
+
+use format::Format;
+use std::path::Path;
+
+/// Reads the model file at `path`: glTF 2.0 (`.gltf`, `.glb`), OBJ, STL or PLY.
+///
+/// The first bytes decide where they can, else the extension.
+/// Errors: no such file, a folder, an empty file, an unknown format, or what the format's reader refuses.
+pub fn read(path: &Path) -> Result<Loaded, Error> {
+    match format::recognise(path)? {
+        Format::Gltf => gltf::read(path),
+    }
+}
