@@ -71,7 +71,7 @@ pub enum Wrap {
 /// How texels are combined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter {
-    /// The nearest texel.
+    /// The nearest texel; prefiltered as `Linear` is where the texture is shrunk on screen.
     Nearest,
     /// Bilinear; prefiltered by halving where the texture is shrunk on screen.
     Linear,

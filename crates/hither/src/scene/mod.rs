@@ -9,15 +9,19 @@
 
 mod animation;
 mod camera;
+mod locator;
 mod material;
 mod mesh;
+mod mip;
 mod nodes;
 mod sample;
 
 pub use animation::{Animation, Channel, Interpolation, Property};
 pub use camera::{Camera, CameraProjection};
+pub use locator::InstanceLocator;
 pub use material::{AlphaMode, Filter, Material, Texture, TextureRef, Wrap};
 pub use mesh::{Mesh, Primitive};
+pub use mip::TexturePyramids;
 pub use nodes::{Content, Group, Instance, Node, Transform};
 pub use sample::{LINEAR_FROM_SRGB, Surface};
 

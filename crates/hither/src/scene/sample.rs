@@ -2,7 +2,7 @@
 //! the same bits on every machine, because a hole decides what is seen.
 //!
 //! Alpha is never prefiltered here: whether a point is a hole depends on the point alone, not on the eye,
-//! so that every algorithm answers alike. Prefiltered colour is a matter of shading.
+//! so that every algorithm answers alike. Prefiltered colour is in [`TexturePyramids`](super::TexturePyramids).
 //!
 //! Texel (i, j) has its centre at ((i + ½) / width, (j + ½) / height), row 0 on top, as glTF has it.
 
