@@ -99,10 +99,7 @@ fn slerp(a: DVec4, b: DVec4, u: f64) -> DVec4 {
 
 fn hermite(p0: DVec4, m0: DVec4, p1: DVec4, m1: DVec4, u: f64) -> DVec4 {
     let (u2, u3) = (u * u, u * u * u);
-    p0 * (2.0 * u3 - 3.0 * u2 + 1.0)
-        + m0 * (u3 - 2.0 * u2 + u)
-        + p1 * (3.0 * u2 - 2.0 * u3)
-        + m1 * (u3 - u2)
+    p0 * (2.0 * u3 - 3.0 * u2 + 1.0) + m0 * (u3 - 2.0 * u2 + u) + p1 * (3.0 * u2 - 2.0 * u3) + m1 * (u3 - u2)
 }
 
 impl Scene {
@@ -131,9 +128,8 @@ pub(super) fn validate(scene: &Scene) -> Result<(), SceneError> {
     let nodes = scene.root_group().nodes.len();
     for (i, animation) in scene.animations.iter().enumerate() {
         for (c, channel) in animation.channels.iter().enumerate() {
-            let wrong = |what: &str| {
-                Err(fault(format!("animation {i} (\"{}\"), channel {c}", animation.name), what))
-            };
+            let wrong =
+                |what: &str| Err(fault(format!("animation {i} (\"{}\"), channel {c}", animation.name), what));
             if channel.node as usize >= nodes {
                 return wrong("it moves a node that does not exist");
             }

@@ -54,12 +54,7 @@ impl Scene {
                 Projection::Orthographic { half_height: half_height.max(half_width / aspect), near, far }
             }
         };
-        Some(View {
-            view_from_world: world_from_view.inverse(),
-            projection,
-            width: size.0,
-            height: size.1,
-        })
+        Some(View { view_from_world: world_from_view.inverse(), projection, width: size.0, height: size.1 })
     }
 
     /// The camera called `name`, else the one whose index `name` spells.

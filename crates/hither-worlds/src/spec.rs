@@ -1,0 +1,192 @@
+//! Reads `key=value&…` against the keys a world declares. Every mistake is one line that says what may
+//! be written instead.
+
+use hither::scene::Scene;
+use std::fmt;
+
+/// What is said about a world.
+#[derive(Clone, Copy, Debug)]
+pub struct WorldInfo {
+    /// The name in a spec.
+    pub name: &'static str,
+    /// What there is to see, in a line.
+    pub description: &'static str,
+    /// The keys a spec may set.
+    pub keys: &'static [KeyInfo],
+    /// Generates it.
+    pub(crate) make: fn(&Values) -> Scene,
+}
+
+/// A key that a spec may set to a whole number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KeyInfo {
+    /// The key's name.
+    pub name: &'static str,
+    /// What it changes, in a few words.
+    pub description: &'static str,
+    /// Smallest value.
+    pub min: u64,
+    /// Largest value.
+    pub max: u64,
+    /// The value where the key is left out.
+    pub default: KeyDefault,
+}
+
+/// What a key is where a spec leaves it out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum KeyDefault {
+    /// This number.
+    Number(u64),
+    /// The value of an earlier key.
+    SameAs(&'static str),
+}
+
+/// Why a world cannot be generated.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum WorldError {
+    /// No world has that name.
+    #[error("there is no world \"{name}\"; there are {known}")]
+    UnknownWorld {
+        /// The name that was asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// The world has no such key.
+    #[error("world {world} has no key \"{key}\"; {known}")]
+    UnknownKey {
+        /// The world.
+        world: &'static str,
+        /// The key that was set.
+        key: String,
+        /// The keys there are, with ranges and defaults.
+        known: String,
+    },
+    /// The value is no whole number, out of range, missing or given twice.
+    #[error("world {world}: {key}={value} {fault}; {key} is a whole number from {min} to {max}")]
+    BadValue {
+        /// The world.
+        world: &'static str,
+        /// The key.
+        key: &'static str,
+        /// What was written.
+        value: String,
+        /// What is wrong with it.
+        fault: &'static str,
+        /// Smallest value.
+        min: u64,
+        /// Largest value.
+        max: u64,
+    },
+}
+
+impl fmt::Display for KeyInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({} to {}, default ", self.name, self.min, self.max)?;
+        match self.default {
+            KeyDefault::Number(n) => write!(f, "{n})"),
+            KeyDefault::SameAs(other) => write!(f, "as {other})"),
+        }
+    }
+}
+
+pub(crate) fn unknown_world(name: &str, known: impl Iterator<Item = &'static str>) -> WorldError {
+    WorldError::UnknownWorld { name: name.to_owned(), known: known.collect::<Vec<_>>().join(", ") }
+}
+
+/// A world's keys with their values, those left out filled in.
+pub(crate) struct Values {
+    keys: &'static [KeyInfo],
+    values: Vec<u64>,
+}
+
+impl Values {
+    pub(crate) fn parse(world: &WorldInfo, query: &str) -> Result<Values, WorldError> {
+        let mut given: Vec<Option<u64>> = vec![None; world.keys.len()];
+        for setting in query.split('&').filter(|s| !s.is_empty()) {
+            let (key, value) = setting.split_once('=').unwrap_or((setting, ""));
+            let at = world.keys.iter().position(|k| k.name == key).ok_or_else(|| unknown_key(world, key))?;
+            let info = &world.keys[at];
+            let wrong = |fault| WorldError::BadValue {
+                world: world.name,
+                key: info.name,
+                value: value.to_owned(),
+                fault,
+                min: info.min,
+                max: info.max,
+            };
+            if given[at].is_some() {
+                return Err(wrong("is the key's second value"));
+            }
+            let number: u64 = value.parse().map_err(|_| wrong("is no whole number"))?;
+            if !(info.min..=info.max).contains(&number) {
+                return Err(wrong("is out of range"));
+            }
+            given[at] = Some(number);
+        }
+        let mut values: Vec<u64> = Vec::with_capacity(given.len());
+        for (info, given) in world.keys.iter().zip(given) {
+            values.push(given.unwrap_or_else(|| match info.default {
+                KeyDefault::Number(n) => n,
+                KeyDefault::SameAs(other) => value_of(world.keys, &values, other),
+            }));
+        }
+        Ok(Values { keys: world.keys, values })
+    }
+
+    /// The value of a key that the world declares.
+    pub(crate) fn get(&self, key: &str) -> u64 {
+        value_of(self.keys, &self.values, key)
+    }
+}
+
+fn value_of(keys: &[KeyInfo], values: &[u64], key: &str) -> u64 {
+    let at = keys.iter().position(|k| k.name == key);
+    values[at.expect("a world reads only keys that it declares")]
+}
+
+fn unknown_key(world: &WorldInfo, key: &str) -> WorldError {
+    let known = if world.keys.is_empty() {
+        "it has none".to_owned()
+    } else {
+        let keys: Vec<String> = world.keys.iter().map(KeyInfo::to_string).collect();
+        format!("it has {}", keys.join(", "))
+    };
+    WorldError::UnknownKey { world: world.name, key: key.to_owned(), known }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KEYS: &[KeyInfo] = &[
+        KeyInfo { name: "n", description: "", min: 1, max: 9, default: KeyDefault::Number(3) },
+        KeyInfo { name: "nx", description: "", min: 1, max: 9, default: KeyDefault::SameAs("n") },
+    ];
+    const WORLD: WorldInfo = WorldInfo { name: "w", description: "", keys: KEYS, make: |_| Scene::default() };
+
+    fn fault(query: &str) -> String {
+        Values::parse(&WORLD, query).err().map(|e| e.to_string()).unwrap_or_default()
+    }
+
+    #[test]
+    fn keys_left_out_take_defaults_or_follow_another_key() {
+        let of = |query| Values::parse(&WORLD, query).map(|v| (v.get("n"), v.get("nx")));
+        assert_eq!(of(""), Ok((3, 3)));
+        assert_eq!(of("n=5"), Ok((5, 5)));
+        assert_eq!(of("nx=2&n=7"), Ok((7, 2)));
+    }
+
+    #[test]
+    fn mistakes_say_what_may_be_written() {
+        assert_eq!(
+            fault("m=2"),
+            "world w has no key \"m\"; it has n (1 to 9, default 3), nx (1 to 9, default as n)"
+        );
+        assert_eq!(fault("n=0"), "world w: n=0 is out of range; n is a whole number from 1 to 9");
+        assert_eq!(fault("n=1.5"), "world w: n=1.5 is no whole number; n is a whole number from 1 to 9");
+        assert!(fault("n").contains("n= is no whole number"));
+        assert!(fault("n=1&n=2").contains("second value"));
+        assert!(fault("n=99999999999999999999999").contains("is no whole number"));
+    }
+}

@@ -1,0 +1,164 @@
+//! Every world is valid, of the size it says, and the same on every machine; its mistakes are clear.
+
+use glam::DVec3;
+use hither::scene::Scene;
+use hither_worlds::{generate, list, occludees};
+
+fn world(spec: &str) -> Scene {
+    let scene = generate(spec).unwrap_or_else(|e| panic!("{spec}: {e}"));
+    scene.validate().unwrap_or_else(|e| panic!("{spec}: {e}"));
+    scene
+}
+
+/// FNV-1a over 32-bit words.
+fn checksum(words: impl Iterator<Item = u32>) -> u64 {
+    words.fold(0xcbf2_9ce4_8422_2325, |h, w| (h ^ u64::from(w)).wrapping_mul(0x100_0000_01b3))
+}
+
+fn geometry_checksum(scene: &Scene) -> u64 {
+    checksum(scene.meshes.iter().flat_map(|m| {
+        let positions = m.positions.iter().flat_map(|p| p.to_array()).map(f32::to_bits);
+        positions.chain(m.triangles.as_flattened().iter().copied())
+    }))
+}
+
+fn camera_names(scene: &Scene) -> Vec<&str> {
+    scene.cameras.iter().map(|c| c.name.as_str()).collect()
+}
+
+/// Positive when triangles are counter-clockwise seen from outside.
+fn volume(scene: &Scene) -> f64 {
+    let mesh = &scene.meshes[0];
+    let corner = |v: u32| mesh.positions[v as usize].as_dvec3();
+    let tetrahedron = |&[a, b, c]: &[u32; 3]| corner(a).dot(corner(b).cross(corner(c))) / 6.0;
+    mesh.triangles.iter().map(tetrahedron).sum()
+}
+
+#[test]
+fn benchmark_geometry_is_pinned_to_the_last_bit() {
+    let pinned = [
+        ("office?n=1", 15_000, 0x49d8_7ea5_2de1_8aa1),
+        ("boxcity", 120_000, 0xf0a3_3485_c736_8429),
+        ("clutter", 20_000, 0xa1f8_5070_3c70_6d53),
+        ("spheres", 1_024_000, 0x06d9_be27_70d8_f0ec),
+    ];
+    let found = pinned.map(|(spec, ..)| {
+        let scene = world(spec);
+        (spec, scene.instanced_triangle_count(), geometry_checksum(&scene))
+    });
+    assert_eq!(found, pinned, "{found:#x?}");
+}
+
+#[test]
+fn occludees_are_pinned_to_the_last_bit() {
+    let pinned = [
+        ("boxcity", 0x56d7_19ea_c15a_42b4),
+        ("clutter", 0x7b48_78db_c479_5646),
+        ("spheres", 0x9828_b004_b2da_c443),
+    ];
+    let found = pinned.map(|(name, _)| {
+        let boxes = occludees(name).unwrap_or_default();
+        assert_eq!(boxes.len(), 100_000, "{name}");
+        let corners = boxes.iter().flat_map(|b| [b.min.to_array(), b.max.to_array()]);
+        (name, checksum(corners.flatten().map(|x| (x as f32).to_bits())))
+    });
+    assert_eq!(found, pinned, "{found:#x?}");
+    assert!(occludees("office").is_none());
+}
+
+#[test]
+fn closed_meshes_face_outwards() {
+    // The office's boxes touch and overlap, but each is closed, so volumes add up.
+    for (spec, cubic_metres) in [("office?n=1", 59.0..59.1), ("spheres", 81_000.0..82_000.0)] {
+        let found = volume(&world(spec));
+        assert!(cubic_metres.contains(&found), "{spec}: {found}");
+    }
+}
+
+#[test]
+fn the_office_holds_539_million_triangles_in_little_memory() {
+    let scene = world("office?n=33");
+    assert_eq!(scene.instance_count(), 35_937);
+    assert_eq!(scene.instanced_triangle_count(), 539_055_000);
+    assert_eq!(scene.meshes.len(), 1);
+    assert_eq!(scene.groups.iter().map(|g| g.nodes.len()).sum::<usize>(), 3 * 33 + 1);
+    let bounds = scene.bounds().unwrap();
+    assert_eq!((bounds.min, bounds.max), (DVec3::new(0.0, 0.0, -396.0), DVec3::new(396.0, 132.0, 0.0)));
+    assert_eq!(camera_names(&scene), ["corridor", "open", "outside", "walk"]);
+}
+
+#[test]
+fn office_instances_are_numbered_along_x_then_z_then_y() {
+    let scene = world("office?nx=2&ny=3&nz=4");
+    let all = scene.instances();
+    assert_eq!(all.len(), 24);
+    for (i, instance) in all.iter().enumerate() {
+        let (x, z, y) = (i % 2, i / 2 % 4, i / 8);
+        let at = DVec3::new(12.0 * x as f64, 4.0 * y as f64, -12.0 * z as f64);
+        assert_eq!(instance.world_from_mesh.translation, at, "instance {i}");
+        let direct = scene.instance(i as u64).map(|i| i.world_from_mesh.translation);
+        assert_eq!(direct, Some(at), "instance {i}");
+    }
+    let path = scene.path_name(&all[13].path);
+    assert_eq!(path, "floor 1/row 2/module 1");
+}
+
+#[test]
+fn one_and_three_modules_are_bare() {
+    for (spec, modules) in [("office?n=1", 1), ("office?nx=3&ny=1&nz=1", 3)] {
+        let scene = world(spec);
+        assert_eq!(scene.groups.len(), 1, "{spec}");
+        assert_eq!(scene.instance_count(), modules, "{spec}");
+    }
+}
+
+#[test]
+fn cameras_sit_where_the_benchmarks_have_them() {
+    let eye_and_direction = |spec: &str, camera: &str| {
+        let scene = world(spec);
+        let pose = scene.find_camera(camera).and_then(|i| scene.world_from_camera(i)).unwrap();
+        (pose.translation, pose.transform_vector3(DVec3::NEG_Z))
+    };
+    let cases = [
+        ("office", "corridor", [198.0, 65.95, -0.5], [0.03, 0.02, -1.0]),
+        ("office?n=2", "corridor", [18.0, 5.95, -0.5], [0.03, 0.02, -1.0]),
+        ("office", "open", [0.6, 66.7, -0.6], [1.0, -0.01, -0.9]),
+        ("office", "outside", [-150.0, 180.0, 220.0], [0.62, -0.25, -0.85]),
+        ("boxcity", "street", [0.5, 1.7, 5.0], [0.02, 0.03, -1.0]),
+        ("clutter", "front", [0.0, 0.0, 0.0], [0.0, 0.0, -1.0]),
+        ("spheres", "front", [0.0, 0.0, 120.0], [0.0, 0.0, -1.0]),
+    ];
+    for (spec, camera, eye, direction) in cases {
+        let (found_eye, found_direction) = eye_and_direction(spec, camera);
+        assert!(found_eye.distance(DVec3::from(eye)) < 1e-9, "{spec} {camera}: {found_eye}");
+        let direction = DVec3::from(direction).normalize();
+        assert!(found_direction.distance(direction) < 1e-12, "{spec} {camera}: {found_direction}");
+    }
+}
+
+#[test]
+fn parts_are_the_same_triangles_one_node_an_object() {
+    for (name, objects) in [("boxcity", 10_000), ("clutter", 20_000), ("spheres", 2_000)] {
+        let (whole, parts) = (world(name), world(&format!("{name}?parts=1")));
+        assert_eq!(parts.instance_count(), objects, "{name}");
+        let corners = |scene: &Scene| {
+            checksum(scene.meshes.iter().flat_map(|m| {
+                m.triangles
+                    .as_flattened()
+                    .iter()
+                    .flat_map(|&v| m.positions[v as usize].to_array().map(f32::to_bits))
+            }))
+        };
+        assert_eq!(corners(&whole), corners(&parts), "{name}");
+    }
+}
+
+#[test]
+fn every_world_is_valid_with_its_defaults_and_unknown_ones_are_named() {
+    for info in list() {
+        let scene = world(info.name);
+        assert!(!scene.cameras.is_empty() && scene.bounds().is_some(), "{}", info.name);
+    }
+    let fault = generate("ofice").map(drop).unwrap_err().to_string();
+    assert!(fault.starts_with("there is no world \"ofice\"; there are office, boxcity"), "{fault}");
+}
