@@ -7,11 +7,16 @@
 
 mod atomic;
 mod error;
+mod exr;
 mod format;
 mod gltf;
+mod png;
+mod srgb;
 
 pub use atomic::{check_writable, write_whole};
 pub use error::{Diagnostic, Error, Loaded};
+pub use exr::{ExrImage, write_exr};
+pub use png::write_png;
 
 use format::Format;
 use std::path::Path;

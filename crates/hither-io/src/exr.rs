@@ -1,0 +1,133 @@
+//! Pictures as OpenEXR files: linear colour, and of the surface seen its distance and its ids, lossless.
+
+use crate::Error;
+use crate::atomic::write_whole;
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text,
+    WritableImage, f16,
+};
+use hither::conventions::SurfaceId;
+use std::io::{self, Cursor};
+use std::path::Path;
+
+/// What an EXR file is made of: rows from the top, `width * height` values a list.
+#[derive(Clone, Copy, Debug)]
+pub struct ExrImage<'a> {
+    /// Width, pixels, at least 1.
+    pub width: u32,
+    /// Height, pixels, at least 1.
+    pub height: u32,
+    /// Linear premultiplied RGBA: channels `R`, `G`, `B`, `A`.
+    pub pixels: &'a [[f32; 4]],
+    /// Whether these four channels are written in 16 bits instead of 32; `Z` never is.
+    pub half: bool,
+    /// Distance along the view axis, metres, of the nearest opaque or masked surface, +∞ where there is
+    /// none: channel `Z`. Empty: no such channel.
+    pub distances: &'a [f32],
+    /// Ids of that surface, [`NO_ID`](hither::conventions::NO_ID) where there is none: 32-bit integer
+    /// channels `instance` and `triangle`. Empty: no such channels.
+    pub surfaces: &'a [SurfaceId],
+}
+
+/// Writes an EXR file, whole or not at all: one part of scan lines, ZIP-compressed.
+///
+/// # Panics
+/// If a list that is not empty has another length than `width * height`.
+pub fn write_exr(path: &Path, image: &ExrImage) -> Result<(), Error> {
+    // The format keeps its table of offsets ahead of the pixels, so it is made in memory and then written.
+    let encoded = encode(image).map_err(|source| Error::Io {
+        path: path.to_owned(),
+        action: "cannot encode",
+        source,
+    })?;
+    write_whole(path, |out| out.write_all(&encoded))
+}
+
+fn encode(image: &ExrImage) -> io::Result<Vec<u8>> {
+    let count = image.width as usize * image.height as usize;
+    let expect = |len: usize| assert_eq!(len, count, "values of a {}x{} picture", image.width, image.height);
+    expect(image.pixels.len());
+    let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
+    for (name, at) in [("R", 0), ("G", 1), ("B", 2), ("A", 3)] {
+        let values = image.pixels.iter().map(|p| p[at]);
+        let samples = if image.half {
+            FlatSamples::F16(values.map(f16::from_f32).collect())
+        } else {
+            FlatSamples::F32(values.collect())
+        };
+        channels.push(channel(name, samples));
+    }
+    if !image.distances.is_empty() {
+        expect(image.distances.len());
+        channels.push(channel("Z", FlatSamples::F32(image.distances.to_vec())));
+    }
+    if !image.surfaces.is_empty() {
+        expect(image.surfaces.len());
+        let ids = |of: fn(&SurfaceId) -> u32| FlatSamples::U32(image.surfaces.iter().map(of).collect());
+        channels.push(channel("instance", ids(|s| s.instance)));
+        channels.push(channel("triangle", ids(|s| s.triangle)));
+    }
+    let software_name = Some(Text::from(concat!("hither ", env!("CARGO_PKG_VERSION"))));
+    let attributes = LayerAttributes { software_name, ..LayerAttributes::default() };
+    let size = (image.width as usize, image.height as usize);
+    let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels));
+    let mut encoded = Cursor::new(Vec::new());
+    Image::from_layer(layer).write().to_buffered(&mut encoded).map_err(|error| match error {
+        exr::error::Error::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    })?;
+    Ok(encoded.into_inner())
+}
+
+fn channel(name: &str, samples: FlatSamples) -> AnyChannel<FlatSamples> {
+    AnyChannel::new(name, samples)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exr::prelude::{ReadChannels, ReadLayers, read};
+    use hither::conventions::NO_ID;
+
+    #[test]
+    fn every_channel_comes_back_bit_for_bit() {
+        let (width, height) = (67, 45);
+        let count = (width * height) as usize;
+        let pixels: Vec<[f32; 4]> =
+            (0..count).map(|i| [i as f32 * 0.37, -1.5, f32::MIN_POSITIVE, 1.0]).collect();
+        let distances: Vec<f32> =
+            (0..count).map(|i| if i % 3 == 0 { f32::INFINITY } else { 1.0 / (i as f32 + 0.1) }).collect();
+        let surfaces: Vec<SurfaceId> = (0..count as u32)
+            .map(|i| SurfaceId {
+                instance: if i % 3 == 0 { NO_ID } else { i },
+                triangle: i.wrapping_mul(0x9e37_79b9),
+            })
+            .collect();
+        for half in [false, true] {
+            let image =
+                ExrImage { width, height, pixels: &pixels, half, distances: &distances, surfaces: &surfaces };
+            let encoded = encode(&image).unwrap();
+            let back = read()
+                .no_deep_data()
+                .largest_resolution_level()
+                .all_channels()
+                .first_valid_layer()
+                .all_attributes()
+                .from_buffered(Cursor::new(encoded))
+                .unwrap();
+            let names: Vec<String> =
+                back.layer_data.channel_data.list.iter().map(|c| c.name.to_string()).collect();
+            assert_eq!(names, ["A", "B", "G", "R", "Z", "instance", "triangle"]);
+            let channel = |name: &str| {
+                let found = back.layer_data.channel_data.list.iter().find(|c| c.name.eq(name));
+                found.map(|c| c.sample_data.clone()).unwrap()
+            };
+            let red: Vec<f32> = channel("R").values_as_f32().collect();
+            let expected = pixels.iter().map(|p| if half { f16::from_f32(p[0]).to_f32() } else { p[0] });
+            assert!(red.into_iter().eq(expected));
+            assert_eq!(channel("Z"), FlatSamples::F32(distances.clone()));
+            assert_eq!(channel("instance"), FlatSamples::U32(surfaces.iter().map(|s| s.instance).collect()));
+            assert_eq!(channel("triangle"), FlatSamples::U32(surfaces.iter().map(|s| s.triangle).collect()));
+        }
+    }
+}
