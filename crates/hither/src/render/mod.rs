@@ -1,10 +1,14 @@
 //! Pictures of what is visible: ids and depth by the hierarchical z-buffer, shading afterwards.
 
+mod blend;
 mod frame;
 mod shade;
 
+pub use blend::{BlendedTriangles, Fragment};
 pub use frame::{Complexity, Counters, Frame};
-pub use shade::{Image, Shading, shade};
+pub use shade::{
+    COMPLEXITY_WHITE, ComplexityPanel, Image, Shader, Shading, complexity_image, complexity_panels, shade,
+};
 
 use crate::conventions::{View, ViewError};
 use crate::index::SceneIndex;

@@ -184,6 +184,11 @@ impl Scene {
         Surface { base_color: material.base_color, alpha_mode: material.alpha, texture, colors }
     }
 
+    /// Whether surfaces of `material` tint what is behind them and hide nothing.
+    pub fn is_blended(&self, material: Option<u32>) -> bool {
+        material.is_some_and(|m| self.materials[m as usize].alpha == AlphaMode::Blend)
+    }
+
     /// [`Surface::alpha`] of one point.
     pub fn surface_alpha(&self, mesh: u32, triangle: u32, barycentric: DVec3) -> f32 {
         self.surface(mesh, triangle).alpha(barycentric)

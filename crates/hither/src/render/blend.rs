@@ -1,0 +1,301 @@
+//! Blended surfaces over a shaded picture: every one in front of what is opaque, in exact depth order at each
+//! pixel centre, however surfaces cross and nest.
+//!
+//! Fragments are kept as one list a band of rows, sorted by pixel, depth and id; memory is bounded by the
+//! band, not by the picture. A tie in depth goes to the smaller id, between blended and opaque surfaces too.
+
+use super::Frame;
+use super::shade::{
+    Image, Light, Normals, Placed, PlacedInstances, SeenTriangle, TriangleInView, depth_at, instances_among,
+    pixel_centre,
+};
+use crate::conventions::{Projection, SurfaceId, View};
+use crate::geometry::Aabb;
+use crate::scene::{Content, Group, InstanceLocator, Mesh, Scene, TexturePyramids};
+use glam::{DAffine3, DVec3, Vec4};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Pixels of a band; at twenty layers everywhere a band's fragments take about 30 MB.
+const BAND_PIXELS: usize = 32_768;
+
+/// A blended surface at a pixel centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fragment {
+    /// Row × image width + column.
+    pub pixel: u32,
+    /// As `conventions` defines it, in (0, 1].
+    pub depth: f32,
+    /// Which surface.
+    pub id: SurfaceId,
+}
+
+impl Fragment {
+    fn is_before(&self, frame: &Frame) -> bool {
+        let (x, y) = (self.pixel % frame.view.width, self.pixel / frame.view.width);
+        let opaque = frame.depth(x, y);
+        self.depth > opaque || (self.depth == opaque && frame.id(x, y).is_some_and(|id| self.id < id))
+    }
+}
+
+/// A fragment with its colour: linear RGBA, straight alpha.
+struct Shaded {
+    fragment: Fragment,
+    color: Vec4,
+}
+
+/// Composites the blended surfaces of `scene` over `image`, the shaded picture of `frame`.
+///
+/// `fragments(rows)` is as [`Shader::shade_with`](super::Shader::shade_with) demands. The pyramids must be
+/// prepared for every blended material.
+pub(super) fn composite(
+    image: &mut Image,
+    scene: &Scene,
+    frame: &Frame,
+    normals: Normals,
+    (locator, pyramids): (&InstanceLocator, &TexturePyramids),
+    fragments: &(impl Fn(Range<u32>) -> Vec<Fragment> + Sync),
+) {
+    let view = &frame.view;
+    let light = Light::new(view.view_from_world.matrix3);
+    let width = view.width as usize;
+    let rows = (BAND_PIXELS / width).max(1);
+    image.pixels.par_chunks_mut(rows * width).enumerate().for_each(|(band, pixels)| {
+        let first = band * rows;
+        let mut found = fragments(first as u32..(first + pixels.len() / width) as u32);
+        found.retain(|f| f.is_before(frame));
+        if found.is_empty() {
+            return;
+        }
+        let numbers = instances_among(found.iter().map(|f| f.id));
+        let instances = PlacedInstances::look_up(numbers, scene, locator, view);
+        let mut shaded = shade_fragments(found, scene, view, normals, &instances, |seen, fragment| {
+            let at = pixel_centre(fragment.pixel % view.width, fragment.pixel / view.width);
+            seen.color(view, at, pyramids, &light)
+        });
+        shaded.sort_unstable_by(|a, b| {
+            let (a, b) = (&a.fragment, &b.fragment);
+            a.pixel.cmp(&b.pixel).then(b.depth.total_cmp(&a.depth)).then(a.id.cmp(&b.id))
+        });
+        shaded.dedup_by_key(|s| (s.fragment.pixel, s.fragment.id));
+        for layers in shaded.chunk_by(|a, b| a.fragment.pixel == b.fragment.pixel) {
+            let pixel = &mut pixels[layers[0].fragment.pixel as usize - first * width];
+            *pixel = over(layers.iter().map(|s| s.color), Vec4::from_array(*pixel)).to_array();
+        }
+    });
+}
+
+/// Fragments of one triangle usually come together, so that it is set up once.
+fn shade_fragments<'a>(
+    fragments: Vec<Fragment>,
+    scene: &'a Scene,
+    view: &View,
+    normals: Normals,
+    instances: &PlacedInstances,
+    color: impl Fn(&SeenTriangle<'a>, &Fragment) -> Vec4,
+) -> Vec<Shaded> {
+    let mut shaded = Vec::with_capacity(fragments.len());
+    for same in fragments.chunk_by(|a, b| a.id == b.id) {
+        let id = same[0].id;
+        let seen = SeenTriangle::new(scene, instances.get(id.instance), id.triangle, view, normals);
+        let colored = same.iter().map(|f| Shaded { fragment: *f, color: color(&seen, f) });
+        shaded.extend(colored.filter(|s| s.color.w > 0.0));
+    }
+    shaded
+}
+
+/// `layers` (straight alpha, front to back) over `ground` (premultiplied).
+fn over(layers: impl Iterator<Item = Vec4>, ground: Vec4) -> Vec4 {
+    let mut sum = Vec4::ZERO;
+    for layer in layers {
+        let premultiplied = (layer.truncate() * layer.w).extend(layer.w);
+        sum += premultiplied * (1.0 - sum.w);
+    }
+    sum + ground * (1.0 - sum.w)
+}
+
+/// The blended triangles that may be seen in a view, found by walking the scene: plain, and exact.
+///
+/// Groups without blended surfaces are never entered, and what is outside the view is left out.
+#[derive(Clone, Debug)]
+pub struct BlendedTriangles<'a> {
+    scene: &'a Scene,
+    view: View,
+    instances: Vec<Placed>,
+    /// Ascending by first row.
+    triangles: Vec<BlendedTriangle>,
+}
+
+#[derive(Clone, Debug)]
+struct BlendedTriangle {
+    id: SurfaceId,
+    /// Index into the instances.
+    placed: u32,
+    first_row: u32,
+    end_row: u32,
+}
+
+/// What a group or a mesh holds of blended surfaces.
+#[derive(Clone, Copy, Debug)]
+struct Holding {
+    instances: u64,
+    /// Around the blended surfaces alone; empty if there are none.
+    blended: Aabb,
+}
+
+impl<'a> BlendedTriangles<'a> {
+    /// Finds them. Cost: the stored nodes, the expanded nodes that lead to blended surfaces in the view, and
+    /// the triangles there.
+    pub fn find(scene: &'a Scene, view: &View) -> BlendedTriangles<'a> {
+        let mut found = BlendedTriangles { scene, view: *view, instances: Vec::new(), triangles: Vec::new() };
+        let meshes: Vec<Aabb> = scene.meshes.iter().map(|m| blended_bounds(scene, m)).collect();
+        if meshes.iter().all(Aabb::is_empty) {
+            return found;
+        }
+        let poses: Vec<Vec<DAffine3>> = scene.groups.iter().map(Group::world_transforms).collect();
+        let mut groups: Vec<Holding> = Vec::with_capacity(scene.groups.len());
+        let holding = |content: Content, groups: &[Holding]| match content {
+            Content::Nothing => Holding { instances: 0, blended: Aabb::EMPTY },
+            Content::Mesh(m) => Holding { instances: 1, blended: meshes[m as usize] },
+            Content::Group(g) => groups[g as usize],
+        };
+        for (group, poses) in scene.groups.iter().zip(&poses) {
+            let mut total = Holding { instances: 0, blended: Aabb::EMPTY };
+            for (node, pose) in group.nodes.iter().zip(poses) {
+                let inner = holding(node.content, &groups);
+                total.instances = total.instances.saturating_add(inner.instances);
+                total.blended = total.blended.union(&inner.blended.transformed(pose));
+            }
+            groups.push(total);
+        }
+        let mut stack = vec![(scene.root as usize, view.view_from_world, 0u64)];
+        while let Some((group, view_from_group, mut number)) = stack.pop() {
+            for (node, pose) in scene.groups[group].nodes.iter().zip(&poses[group]) {
+                let inner = holding(node.content, &groups);
+                let view_from_node = view_from_group * *pose;
+                if !inner.blended.is_empty() && may_be_seen(view, &inner.blended.transformed(&view_from_node))
+                {
+                    match node.content {
+                        Content::Mesh(mesh) => {
+                            found.add(number as u32, Placed { mesh, view_from_mesh: view_from_node });
+                        }
+                        Content::Group(g) => stack.push((g as usize, view_from_node, number)),
+                        Content::Nothing => {}
+                    }
+                }
+                number += inner.instances;
+            }
+        }
+        found.triangles.sort_by_key(|t| (t.first_row, t.id));
+        found
+    }
+
+    fn add(&mut self, instance: u32, placed: Placed) {
+        let mirrored = placed.view_from_mesh.matrix3.determinant() < 0.0;
+        let at = self.instances.len() as u32;
+        self.instances.push(placed);
+        for primitive in &self.scene.meshes[placed.mesh as usize].primitives {
+            let Some(material) = primitive.material.filter(|&m| self.scene.is_blended(Some(m))) else {
+                continue;
+            };
+            let double_sided = self.scene.materials[material as usize].double_sided;
+            for triangle in primitive.triangles.clone() {
+                let corners = placed.corners(self.scene, triangle);
+                let turned = TriangleInView::new(&self.view, corners).orientation;
+                let is_front = if mirrored { turned < 0.0 } else { turned > 0.0 };
+                if turned == 0.0 || !(is_front || double_sided) {
+                    continue;
+                }
+                let rows = rows_of(&self.view, corners);
+                if !rows.is_empty() {
+                    self.triangles.push(BlendedTriangle {
+                        id: SurfaceId { instance, triangle },
+                        placed: at,
+                        first_row: rows.start,
+                        end_row: rows.end,
+                    });
+                }
+            }
+        }
+    }
+
+    /// Every fragment with its pixel centre in `rows` of the image, whatever lies before it.
+    pub fn fragments(&self, rows: Range<u32>) -> Vec<Fragment> {
+        let mut fragments = Vec::new();
+        let begun = self.triangles.partition_point(|t| t.first_row < rows.end);
+        for t in self.triangles[..begun].iter().filter(|t| t.end_row > rows.start) {
+            let corners = self.instances[t.placed as usize].corners(self.scene, t.id.triangle);
+            let in_view = TriangleInView::new(&self.view, corners);
+            for y in t.first_row.max(rows.start)..t.end_row.min(rows.end) {
+                for x in in_view.columns(y, self.view.width) {
+                    let depth = in_view
+                        .hit(pixel_centre(x, y))
+                        .and_then(|weights| depth_at(&self.view.projection, in_view.distance(weights)));
+                    if let Some(depth) = depth {
+                        fragments.push(Fragment { pixel: y * self.view.width + x, depth, id: t.id });
+                    }
+                }
+            }
+        }
+        fragments
+    }
+}
+
+fn blended_bounds(scene: &Scene, mesh: &Mesh) -> Aabb {
+    let blended = mesh.primitives.iter().filter(|p| scene.is_blended(p.material));
+    let triangles =
+        blended.flat_map(|p| &mesh.triangles[p.triangles.start as usize..p.triangles.end as usize]);
+    Aabb::around(triangles.flatten().map(|&v| mesh.positions[v as usize].as_dvec3()))
+}
+
+/// False only if no point of the box in view space is in the picture.
+fn may_be_seen(view: &View, bounds: &Aabb) -> bool {
+    let (nearest, farthest) = (-bounds.max.z, -bounds.min.z);
+    let half_height = f64::from(view.height) * 0.5 / view.pixels_per_unit();
+    let half_width = f64::from(view.width) * 0.5 / view.pixels_per_unit();
+    let reach = match view.projection {
+        Projection::Perspective { near, .. } => {
+            if farthest < near {
+                return false;
+            }
+            farthest
+        }
+        Projection::Orthographic { near, far, .. } => {
+            if farthest < near || nearest > far {
+                return false;
+            }
+            1.0
+        }
+    };
+    // A little larger than the picture: rounding must not lose its outermost pixels.
+    let reach = reach * (1.0 + 1e-9);
+    let outside = bounds.min.x > half_width * reach
+        || bounds.max.x < -half_width * reach
+        || bounds.min.y > half_height * reach
+        || bounds.max.y < -half_height * reach;
+    !outside
+}
+
+/// Rows of the image whose pixel centres a triangle in view space may cover.
+fn rows_of(view: &View, corners: [DVec3; 3]) -> Range<u32> {
+    let height = f64::from(view.height);
+    let scale = view.pixels_per_unit();
+    let (mut top, mut bottom) = (f64::INFINITY, f64::NEG_INFINITY);
+    for c in corners {
+        let up = match view.projection {
+            // Partly behind the near plane: it may reach any row.
+            Projection::Perspective { near, .. } if -c.z < near => return 0..view.height,
+            Projection::Perspective { .. } => c.y / -c.z,
+            Projection::Orthographic { .. } => c.y,
+        };
+        let y = height * 0.5 - up * scale;
+        (top, bottom) = (top.min(y), bottom.max(y));
+    }
+    // Half a pixel to the centres, and a little for rounding.
+    let first = (top - 0.51).ceil().clamp(0.0, height);
+    let end = ((bottom - 0.49).floor() + 1.0).clamp(0.0, height);
+    first as u32..(end as u32).max(first as u32)
+}
+
+#[cfg(test)]
+mod tests;

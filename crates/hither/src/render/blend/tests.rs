@@ -1,0 +1,254 @@
+//! Blended surfaces against rays that meet every triangle of the expanded scene.
+
+use super::*;
+use crate::render::shade::fixture::{at, colored, frame, front_view, scene, square};
+use crate::render::{Shader, Shading};
+use crate::scene::{AlphaMode, Material, Node, Transform};
+use glam::{DQuat, Vec3};
+use proptest::prelude::*;
+
+fn glass(r: f32, g: f32, b: f32, alpha: f32) -> Material {
+    colored(Vec4::new(r, g, b, alpha), AlphaMode::Blend)
+}
+
+fn centre(image: &Image) -> Vec4 {
+    // Off the squares' diagonals.
+    Vec4::from_array(image.pixels[(16 * image.width + 22) as usize])
+}
+
+fn picture(scene: &Scene, view: &View) -> Image {
+    Shader::new(scene, 1).shade(scene, &frame(scene, view), Shading::Flat)
+}
+
+/// Light on a white square facing the eye, at the pixel of [`centre`].
+fn white() -> Vec4 {
+    let material = colored(Vec4::ONE, AlphaMode::Opaque);
+    centre(&picture(&scene(vec![material], vec![(square(Some(0)), at(0.0, 0.0, 0.0))]), &front_view()))
+}
+
+fn close(a: Vec4, b: Vec4) -> bool {
+    (a - b).abs().max_element() < 2e-3
+}
+
+#[test]
+fn layers_tint_in_the_order_of_their_depth() {
+    let materials = || {
+        vec![
+            glass(1.0, 0.0, 0.0, 0.5),
+            glass(0.0, 1.0, 0.0, 0.25),
+            colored(Vec4::new(0.0, 0.0, 1.0, 1.0), AlphaMode::Opaque),
+        ]
+    };
+    let red_first = vec![
+        (square(Some(2)), at(0.0, 0.0, -1.0)),
+        (square(Some(0)), at(0.0, 0.0, 1.0)),
+        (square(Some(1)), at(0.0, 0.0, 0.0)),
+        (square(Some(1)), at(0.0, 0.0, -2.0)),
+    ];
+    let lit = white();
+    let mut order = red_first.clone();
+    for turn in 0..4 {
+        let image = picture(&scene(materials(), order.clone()), &front_view());
+        let expected = Vec4::new(0.5, 0.5 * 0.25, 0.5 * 0.75, 1.0) * lit;
+        assert!(close(centre(&image), expected), "turn {turn}: {} is not {expected}", centre(&image));
+        order.rotate_left(1);
+    }
+}
+
+#[test]
+fn over_nothing_a_pane_is_translucent_and_premultiplied() {
+    let scene = scene(vec![glass(0.8, 0.4, 0.2, 0.5)], vec![(square(Some(0)), at(0.0, 0.0, 0.0))]);
+    let image = picture(&scene, &front_view());
+    let expected = Vec4::new(0.4, 0.2, 0.1, 0.5) * white().truncate().extend(1.0);
+    assert!(close(centre(&image), expected));
+    assert_eq!(image.pixels[0], [0.0; 4]);
+}
+
+#[test]
+fn ids_and_measurements_ignore_glass() {
+    let scene = scene(vec![glass(1.0, 1.0, 1.0, 1.0)], vec![(square(Some(0)), at(0.0, 0.0, 0.0))]);
+    let frame = frame(&scene, &front_view());
+    for shading in [Shading::Ids, Shading::Depth, Shading::Normals, Shading::Complexity] {
+        let image = Shader::new(&scene, 1).shade(&scene, &frame, shading);
+        assert!(image.pixels.iter().all(|p| *p == [0.0; 4]));
+    }
+}
+
+#[test]
+fn panes_that_cross_are_ordered_at_each_pixel() {
+    let turned = |angle: f64| Transform::Trs {
+        translation: DVec3::ZERO,
+        rotation: DQuat::from_rotation_y(angle),
+        scale: DVec3::ONE,
+    };
+    let materials = vec![glass(1.0, 0.0, 0.0, 0.9), glass(0.0, 1.0, 0.0, 0.9)];
+    let parts = vec![(square(Some(0)), turned(0.5)), (square(Some(1)), turned(-0.5))];
+    let image = picture(&scene(materials, parts), &front_view());
+    let [left, right] = [17, 23].map(|x| image.pixels[15 * 40 + x]);
+    // Turned about +Y by a positive angle, a square's left half comes forward.
+    assert!(left[0] > 5.0 * left[1] && right[1] > 5.0 * right[0], "{left:?} {right:?}");
+}
+
+#[test]
+fn a_tie_in_depth_goes_to_the_smaller_instance_opaque_ones_included() {
+    let materials = || {
+        vec![
+            glass(1.0, 0.0, 0.0, 0.5),
+            glass(0.0, 1.0, 0.0, 0.5),
+            colored(Vec4::new(0.0, 0.0, 1.0, 1.0), AlphaMode::Opaque),
+        ]
+    };
+    let of = |kinds: [u32; 3]| {
+        let parts = kinds.map(|m| (square(Some(m)), at(0.0, 0.0, 0.0))).to_vec();
+        centre(&picture(&scene(materials(), parts), &front_view())) / white()
+    };
+    assert!(close(of([0, 1, 2]), Vec4::new(0.5, 0.25, 0.25, 1.0)));
+    assert!(close(of([1, 0, 2]), Vec4::new(0.25, 0.5, 0.25, 1.0)));
+    assert!(close(of([0, 2, 1]), Vec4::new(0.5, 0.0, 0.5, 1.0)));
+    assert!(close(of([2, 0, 1]), Vec4::new(0.0, 0.0, 1.0, 1.0)));
+}
+
+#[test]
+fn back_faces_of_single_sided_glass_are_not_there() {
+    let material = Material { double_sided: false, ..glass(1.0, 1.0, 1.0, 0.5) };
+    let scaled = |x: f64, y: f64| Transform::Trs {
+        translation: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        scale: DVec3::new(x, y, 1.0),
+    };
+    let turned = Transform::Trs {
+        translation: DVec3::ZERO,
+        rotation: DQuat::from_rotation_y(std::f64::consts::PI),
+        scale: DVec3::ONE,
+    };
+    let shows = |local: Transform| {
+        centre(&picture(&scene(vec![material.clone()], vec![(square(Some(0)), local)]), &front_view())).w
+            > 0.0
+    };
+    assert!(shows(scaled(1.0, 1.0)) && shows(scaled(-1.0, 1.0)) && shows(scaled(-1.0, -1.0)));
+    assert!(!shows(turned));
+}
+
+#[test]
+fn repeated_fragments_count_once_and_bands_do_not_show() {
+    let scene = scene(vec![glass(1.0, 0.5, 0.2, 0.5)], vec![(square(Some(0)), at(0.0, 0.0, 0.0))]);
+    let view = View { width: 400, height: 300, ..front_view() };
+    let frame = Frame::empty(view);
+    let blended = BlendedTriangles::find(&scene, &view);
+    let mut shader = Shader::new(&scene, 1);
+    let once = shader.shade_with(&scene, &frame, Shading::Flat, |rows| blended.fragments(rows));
+    let twice = shader.shade_with(&scene, &frame, Shading::Flat, |rows| {
+        let mut found = blended.fragments(rows);
+        found.reverse();
+        found.extend_from_within(..);
+        found
+    });
+    assert_eq!(once, twice);
+    let whole = blended.fragments(0..300);
+    let parts: usize = (0..300).map(|y| blended.fragments(y..y + 1).len()).sum();
+    assert_eq!(whole.len(), parts);
+    let covered = once.pixels.iter().filter(|p| p[3] > 0.0).count();
+    assert_eq!(covered, whole.len());
+    assert!(once.pixels.iter().all(|p| p[3] == 0.0 || (p[3] - 0.5).abs() < 1e-6));
+}
+
+/// The distance along the view axis at which a ray meets a triangle [Möller & Trumbore 1997].
+fn meet(origin: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
+    let (ab, ac) = (b - a, c - a);
+    let p = direction.cross(ac);
+    let determinant = ab.dot(p);
+    let from_a = origin - a;
+    let u = from_a.dot(p) / determinant;
+    let q = from_a.cross(ab);
+    let v = direction.dot(q) / determinant;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| -(origin + direction * (ac.dot(q) / determinant)).z)
+}
+
+/// Every blended surface that the ray through a pixel's centre meets.
+fn fragments_by_rays(scene: &Scene, view: &View) -> Vec<(u32, SurfaceId, f64)> {
+    let unit = 1.0 / view.pixels_per_unit();
+    let mut found = Vec::new();
+    for (i, instance) in scene.instances().iter().enumerate() {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let view_from_mesh = view.view_from_world * instance.world_from_mesh;
+        for (t, corners) in mesh.triangles.iter().enumerate() {
+            if !scene.is_blended(mesh.material_of(t as u32)) {
+                continue;
+            }
+            let corners =
+                corners.map(|v| view_from_mesh.transform_point3(mesh.positions[v as usize].as_dvec3()));
+            for pixel in 0..view.width * view.height {
+                let x = (f64::from(pixel % view.width) + 0.5 - f64::from(view.width) * 0.5) * unit;
+                let y = -(f64::from(pixel / view.width) + 0.5 - f64::from(view.height) * 0.5) * unit;
+                let (origin, direction, clip) = match view.projection {
+                    Projection::Perspective { near, .. } => {
+                        (DVec3::ZERO, DVec3::new(x, y, -1.0), near..=f64::INFINITY)
+                    }
+                    Projection::Orthographic { near, far, .. } => {
+                        (DVec3::new(x, y, 0.0), DVec3::NEG_Z, near..=far)
+                    }
+                };
+                let distance = meet(origin, direction, corners).filter(|d| clip.contains(d));
+                let id = SurfaceId { instance: i as u32, triangle: t as u32 };
+                found.extend(distance.map(|d| (pixel, id, d)));
+            }
+        }
+    }
+    found.sort_by_key(|a| (a.0, a.1));
+    found
+}
+
+fn point() -> impl Strategy<Value = Vec3> {
+    (-4.0..4.0f32, -4.0..4.0f32, -9.0..4.0f32).prop_map(|(x, y, z)| Vec3::new(x, y, z))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    /// In front, beside, behind and across the eye; nested, mirrored, partly without blended surfaces.
+    #[test]
+    fn what_the_walk_finds_is_what_rays_find(
+        points in prop::collection::vec(point(), 6..24),
+        flat in any::<bool>(),
+        mirror in any::<bool>(),
+    ) {
+        let corners = points.len() as u32 / 3 * 3;
+        let mesh = Mesh {
+            positions: points,
+            triangles: (0..corners).step_by(3).map(|i| [i, i + 1, i + 2]).collect(),
+            primitives: vec![crate::scene::Primitive { triangles: 0..corners / 3, material: Some(0) }],
+            ..Mesh::default()
+        };
+        let solid = square(Some(1));
+        let materials = vec![glass(1.0, 0.0, 0.0, 0.5), colored(Vec4::ONE, AlphaMode::Opaque)];
+        let mut scene = scene(materials, vec![
+            (solid, at(0.0, 0.0, -3.0)),
+            (mesh, at(0.5, 0.0, 0.0)),
+        ]);
+        let mut outer = Group::default();
+        for i in 0..3 {
+            let scale = if mirror { DVec3::new(-1.0, 0.5, 1.0) } else { DVec3::splat(1.5) };
+            let rotation = DQuat::from_rotation_y(f64::from(i) * 1.3);
+            let translation = DVec3::new(f64::from(i) - 1.0, 0.3, -f64::from(i));
+            let local = Transform::Trs { translation, rotation, scale };
+            outer.push(Node { local, content: Content::Group(0), ..Node::default() });
+        }
+        scene.groups.push(outer);
+        scene.root = 1;
+        let projection = if flat {
+            Projection::Orthographic { half_height: 3.0, near: -1.0, far: 6.0 }
+        } else {
+            Projection::Perspective { fov_y: 1.3, near: 0.2 }
+        };
+        let view = View::look_at(DVec3::Z, DVec3::NEG_Z, DVec3::Y, projection, (24, 18));
+        let mut found = BlendedTriangles::find(&scene, &view).fragments(0..18);
+        found.sort_by_key(|a| (a.pixel, a.id));
+        let expected = fragments_by_rays(&scene, &view);
+        prop_assert_eq!(found.len(), expected.len());
+        for (fragment, (pixel, id, distance)) in found.iter().zip(&expected) {
+            prop_assert_eq!((fragment.pixel, fragment.id), (*pixel, *id));
+            let d = view.projection.distance(fragment.depth);
+            prop_assert!((d - distance).abs() < 1e-5 * (1.0 + distance.abs()), "{} is not {}", d, distance);
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! The light that pictures are shaded in: made to keep forms apart, indoors and out, on surfaces of one grey.
+//!
+//! A sky and a ground (so that floors, walls and ceilings differ), two far lamps from unlike directions (so
+//! that no two walls of a box are alike), and a headlight (so that what turns away from the eye darkens). No
+//! shadows. A white surface never exceeds 1.
+
+use glam::{DMat3, DVec3, Vec3};
+
+const SKY: Vec3 = Vec3::new(0.36, 0.385, 0.42);
+const GROUND: Vec3 = Vec3::new(0.185, 0.175, 0.165);
+const KEY: Vec3 = Vec3::new(0.36, 0.35, 0.33);
+const FILL: Vec3 = Vec3::new(0.085, 0.09, 0.1);
+const HEADLIGHT: f32 = 0.17;
+
+/// Towards the lamps, in world space, not normalised.
+const KEY_DIRECTION: DVec3 = DVec3::new(0.6, 0.7, 0.3);
+const FILL_DIRECTION: DVec3 = DVec3::new(-0.5, 0.25, -0.8);
+
+/// How far a lamp reaches around a form: 0 stops where the surface turns away, 1 goes all around.
+const KEY_WRAP: f32 = 0.35;
+
+/// The lights as seen from one eye.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::render) struct Light {
+    up: DVec3,
+    key: DVec3,
+    fill: DVec3,
+}
+
+impl Light {
+    /// `view_from_world` is the rotation of the view.
+    pub(in crate::render) fn new(view_from_world: DMat3) -> Light {
+        Light {
+            up: view_from_world * DVec3::Y,
+            key: view_from_world * KEY_DIRECTION.normalize(),
+            fill: view_from_world * FILL_DIRECTION.normalize(),
+        }
+    }
+
+    /// Light leaving a white surface with unit `normal` towards `toward_eye`, both in view space.
+    pub(in crate::render) fn on(&self, normal: DVec3, toward_eye: DVec3) -> Vec3 {
+        let facing = |direction: DVec3| normal.dot(direction) as f32;
+        let key = ((facing(self.key) + KEY_WRAP) / (1.0 + KEY_WRAP)).clamp(0.0, 1.0);
+        GROUND.lerp(SKY, (facing(self.up) * 0.5 + 0.5).clamp(0.0, 1.0))
+            + KEY * (key * key)
+            + FILL * facing(self.fill).clamp(0.0, 1.0)
+            + Vec3::splat(HEADLIGHT * facing(toward_eye).clamp(0.0, 1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_stays_within_bounds_and_the_sides_of_a_box_differ() {
+        let light = Light::new(DMat3::IDENTITY);
+        let mut dark_to_bright = 1.0f32..0.0;
+        for i in 0..40 {
+            for j in 0..40 {
+                let (a, b) = (f64::from(i) * 0.08, f64::from(j) * 0.16);
+                let normal = DVec3::new(a.sin() * b.cos(), a.cos(), a.sin() * b.sin());
+                let white = light.on(normal, normal);
+                dark_to_bright.start = dark_to_bright.start.min(white.min_element());
+                dark_to_bright.end = dark_to_bright.end.max(white.max_element());
+            }
+        }
+        assert!(dark_to_bright.start > 0.1 && dark_to_bright.end <= 1.0, "{dark_to_bright:?}");
+        // Seen from a corner, where the headlight tells nothing apart.
+        let corner = DVec3::ONE.normalize();
+        let leaving = |n: DVec3| light.on(n, corner * n.dot(corner).signum());
+        let sides = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
+        for (i, a) in sides.iter().enumerate() {
+            for b in sides[..i].iter().filter(|b| a.dot(**b) == 0.0) {
+                let difference = (leaving(*a) - leaving(*b)).abs().max_element();
+                assert!(difference > 0.025, "{a} and {b} differ by {difference}");
+            }
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! Shading, deferred: once a pixel, from the ids and depth of a finished frame, then blended surfaces over it.
+//!
+//! The picture does not depend on the number of threads. Where nothing is seen it is transparent.
+
+mod false_color;
+#[cfg(test)]
+pub(super) mod fixture;
+mod light;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod triangle;
+
+pub use false_color::{COMPLEXITY_WHITE, ComplexityPanel, complexity_image, complexity_panels};
+pub(super) use light::Light;
+pub(super) use surface::{Normals, Placed, PlacedInstances, SeenTriangle, instances_among};
+pub(super) use triangle::{TriangleInView, depth_at};
+
+use super::Frame;
+use super::blend::{BlendedTriangles, Fragment, composite};
+use crate::conventions::SurfaceId;
+use crate::index::SceneIndex;
+use crate::scene::{InstanceLocator, Scene, TexturePyramids};
+use false_color::{DepthRange, id_color, normal_color};
+use glam::DVec2;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// How a picture is shaded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Shading {
+    /// Base colour, lit on the face's own plane.
+    Flat,
+    /// Base colour, lit on interpolated normals where the mesh has them.
+    #[default]
+    Smooth,
+    /// A colour for each instance.
+    Ids,
+    /// Distance as grey, near white, over the range that the frame shows.
+    Depth,
+    /// World-space normals as colours, on the side that is seen.
+    Normals,
+    /// Log-scale picture of where the work was done [Greene 1995, fig. 3.8]; all transparent if the frame
+    /// did not record it.
+    Complexity,
+}
+
+impl Shading {
+    /// Whether blended surfaces show: they tint what is lit, and leave ids and measurements alone.
+    pub fn shows_blended(self) -> bool {
+        matches!(self, Shading::Flat | Shading::Smooth)
+    }
+
+    fn normals(self) -> Normals {
+        if self == Shading::Flat { Normals::Face } else { Normals::Vertices }
+    }
+}
+
+/// A picture: rows from the top, linear premultiplied RGBA.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
+    /// Row by row.
+    pub pixels: Vec<[f32; 4]>,
+}
+
+/// Shades a finished frame of `index` in its present pose.
+///
+/// For a sequence of frames keep a [`Shader`], which prefilters textures once.
+pub fn shade(index: &SceneIndex, frame: &Frame, shading: Shading) -> Image {
+    Shader::new(index.scene(), 0).shade(index.scene(), frame, shading)
+}
+
+/// Shades frames of one scene and keeps what is the same in all of them: prefiltered textures, the numbering
+/// of instances. The scene may be posed anew between frames.
+#[derive(Debug)]
+pub struct Shader {
+    locator: InstanceLocator,
+    pyramids: TexturePyramids,
+    threads: Option<rayon::ThreadPool>,
+}
+
+impl Shader {
+    /// A shader for `scene` on `threads` worker threads; 0 means those that rayon has anyway.
+    pub fn new(scene: &Scene, threads: usize) -> Shader {
+        let pool = || rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok();
+        Shader {
+            locator: InstanceLocator::new(scene),
+            pyramids: TexturePyramids::new(scene),
+            threads: if threads == 0 { None } else { pool() },
+        }
+    }
+
+    /// Shades `frame`, which must be of `scene` in its present pose.
+    pub fn shade(&mut self, scene: &Scene, frame: &Frame, shading: Shading) -> Image {
+        if !shading.shows_blended() {
+            return self.shade_with(scene, frame, shading, |_| Vec::new());
+        }
+        let blended = BlendedTriangles::find(scene, &frame.view);
+        self.shade_with(scene, frame, shading, |rows| blended.fragments(rows))
+    }
+
+    /// As [`Shader::shade`], with the fragments of blended surfaces found by the caller: `fragments(rows)`
+    /// returns, in any order, at least those in front of the frame's surfaces with a pixel centre in the
+    /// rows, one a surface and pixel.
+    pub fn shade_with(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        shading: Shading,
+        fragments: impl Fn(Range<u32>) -> Vec<Fragment> + Sync,
+    ) -> Image {
+        let threads = self.threads.take();
+        let mut work = || self.shade_here(scene, frame, shading, &fragments);
+        let image = match &threads {
+            Some(pool) => pool.install(work),
+            None => work(),
+        };
+        self.threads = threads;
+        image
+    }
+
+    fn shade_here(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        shading: Shading,
+        fragments: &(impl Fn(Range<u32>) -> Vec<Fragment> + Sync),
+    ) -> Image {
+        let (width, height) = (frame.view.width, frame.view.height);
+        let nothing = || Image { width, height, pixels: vec![[0.0; 4]; width as usize * height as usize] };
+        match shading {
+            Shading::Complexity => {
+                return complexity_image(frame, ComplexityPanel::Sum).unwrap_or_else(nothing);
+            }
+            Shading::Ids => return each_pixel(frame, |_, _, id| id_color(id)),
+            Shading::Depth => {
+                let range = DepthRange::of(frame);
+                return each_pixel(frame, |x, y, _| range.color(frame.distance(x, y)));
+            }
+            Shading::Flat | Shading::Smooth | Shading::Normals => {}
+        }
+        let instances = self.instances_in(scene, frame);
+        self.prepare_textures(scene, instances.meshes());
+        let mut image = shade_opaque(scene, frame, shading, &instances, &self.pyramids);
+        if shading.shows_blended() {
+            self.prepare_blended_textures(scene);
+            composite(
+                &mut image,
+                scene,
+                frame,
+                shading.normals(),
+                (&self.locator, &self.pyramids),
+                fragments,
+            );
+        }
+        image
+    }
+
+    fn instances_in(&self, scene: &Scene, frame: &Frame) -> PlacedInstances {
+        let rows = (0..frame.view.height).into_par_iter();
+        let numbers = rows.flat_map_iter(|y| {
+            let mut row = instances_among((0..frame.view.width).filter_map(|x| frame.id(x, y)));
+            row.sort_unstable();
+            row.dedup();
+            row
+        });
+        PlacedInstances::look_up(numbers.collect(), scene, &self.locator, &frame.view)
+    }
+
+    fn prepare_textures(&mut self, scene: &Scene, meshes: impl Iterator<Item = u32>) {
+        if scene.textures.is_empty() {
+            return;
+        }
+        let mut meshes: Vec<u32> = meshes.collect();
+        meshes.sort_unstable();
+        meshes.dedup();
+        let primitives = meshes.iter().flat_map(|&m| &scene.meshes[m as usize].primitives);
+        self.pyramids.prepare(scene, primitives.filter_map(|p| p.material));
+    }
+
+    fn prepare_blended_textures(&mut self, scene: &Scene) {
+        let blended = (0..scene.materials.len() as u32).filter(|&m| scene.is_blended(Some(m)));
+        self.pyramids.prepare(scene, blended);
+    }
+}
+
+/// The middle of pixel (x, y), in pixels.
+pub(super) fn pixel_centre(x: u32, y: u32) -> DVec2 {
+    DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5)
+}
+
+fn each_pixel(frame: &Frame, color: impl Fn(u32, u32, SurfaceId) -> [f32; 4] + Sync) -> Image {
+    let (width, height) = (frame.view.width, frame.view.height);
+    let rows = (0..height).into_par_iter().flat_map_iter(|y| {
+        let color = &color;
+        (0..width).map(move |x| frame.id(x, y).map_or([0.0; 4], |id| color(x, y, id)))
+    });
+    Image { width, height, pixels: rows.collect() }
+}
+
+fn shade_opaque(
+    scene: &Scene,
+    frame: &Frame,
+    shading: Shading,
+    instances: &PlacedInstances,
+    pyramids: &TexturePyramids,
+) -> Image {
+    let view = &frame.view;
+    let light = Light::new(view.view_from_world.matrix3);
+    let world_from_view = view.view_from_world.matrix3.transpose();
+    let (width, height) = (view.width, view.height);
+    let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
+    pixels.par_chunks_mut(width as usize).enumerate().for_each(|(y, row)| {
+        let mut last: Option<(SurfaceId, SeenTriangle)> = None;
+        for (x, pixel) in row.iter_mut().enumerate() {
+            let Some(id) = frame.id(x as u32, y as u32) else { continue };
+            let (_, seen) = match last.take() {
+                Some(same) if same.0 == id => last.insert(same),
+                _ => {
+                    let placed = instances.get(id.instance);
+                    let seen = SeenTriangle::new(scene, placed, id.triangle, view, shading.normals());
+                    last.insert((id, seen))
+                }
+            };
+            let at = pixel_centre(x as u32, y as u32);
+            *pixel = match shading {
+                Shading::Normals => normal_color(world_from_view * seen.normal(at)),
+                // What is seen is opaque, whatever its alpha.
+                _ => seen.color(view, at, pyramids, &light).truncate().extend(1.0).to_array(),
+            };
+        }
+    });
+    Image { width, height, pixels }
+}
