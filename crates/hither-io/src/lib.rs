@@ -6,14 +6,18 @@
 #![forbid(unsafe_code)]
 
 mod atomic;
+mod companions;
 mod error;
 mod exr;
 mod format;
 mod gltf;
 mod png;
 mod srgb;
+#[allow(dead_code)] // its users follow
+mod texture;
 
 pub use atomic::{check_writable, write_whole};
+pub use companions::{Companions, ModelFolder};
 pub use error::{Diagnostic, Error, Loaded};
 pub use exr::{ExrImage, write_exr};
 pub use png::write_png;
