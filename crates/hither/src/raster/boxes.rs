@@ -1,0 +1,208 @@
+//! Sixteen boxes at a time onto the screen: the rectangle of pixel centres each may cover, and the nearest
+//! depth it may reach. Conservative in f32.
+//!
+//! # The bound
+//!
+//! A row's dot product in f32 with rounded coefficients differs from the exact one by at most
+//! `8·2⁻²⁴·(|r₀|·X + |r₁|·Y + |r₂|·Z + |r₃|)` where X, Y, Z bound the coordinates (four rounded
+//! coefficients, three products, three sums, and the incremental corner). [`BoxSet::new`] takes that for
+//! all boxes of a tree at once. With errors `eₓ` of a numerator, `e_w` of W, and quotient `q`, a screen
+//! coordinate is off by at most `(eₓ + |q|·e_w) / (W − e_w)` plus 4 roundings of `q`; snapping a corner
+//! moves it by at most 1/512 pixel more. Boxes that may reach the near plane cover the whole window.
+
+use super::pyramid::Rect;
+use super::transform::ScreenFromObject;
+use fearless_simd::{Simd, f32x16, prelude::*};
+
+/// One object's transform, prepared for its boxes.
+#[derive(Clone, Copy, Debug)]
+pub struct BoxSet {
+    x: [f32; 4],
+    y: [f32; 4],
+    w: [f32; 4],
+    d: [f32; 4],
+    error: [f32; 4],
+    perspective: bool,
+    /// Whether f32 can hold the numbers; else every box counts as seen everywhere.
+    in_range: bool,
+}
+
+/// Where sixteen boxes lie; lanes outside `alive` are meaningless.
+#[derive(Clone, Copy, Debug)]
+pub struct ProjectedBoxes {
+    /// First column of each box's pixel centres, window coordinates, clipped to the window.
+    pub left: [f32; 16],
+    /// First row.
+    pub top: [f32; 16],
+    /// Last column (inclusive).
+    pub right: [f32; 16],
+    /// Last row (inclusive).
+    pub bottom: [f32; 16],
+    /// No point of the box has a larger depth; +∞ where the box may reach the near plane.
+    pub depth: [f32; 16],
+    /// Boxes that may hold a pixel centre of the window.
+    pub alive: u16,
+}
+
+impl BoxSet {
+    /// Prepares `at` for boxes whose coordinates are at most `reach` in magnitude.
+    pub fn new(at: &ScreenFromObject, reach: [f64; 3]) -> BoxSet {
+        let pixels = |r: [f64; 4]| r.map(|c| c / 256.0);
+        let rows = [pixels(at.x), pixels(at.y), at.w, at.d];
+        let error = rows.map(|r| {
+            let size = r[0].abs() * reach[0] + r[1].abs() * reach[1] + r[2].abs() * reach[2] + r[3].abs();
+            (size * 8.0 / f64::from(1 << 24)) as f32 * 1.000_001
+        });
+        let [x, y, w, d] = rows.map(|r| r.map(|c| c as f32));
+        // Squares of nothing are taken here; quotients and margins stay below 1e38 under this bound.
+        let in_range = error.iter().all(|e| *e < 1e25);
+        BoxSet { x, y, w, d, error, perspective: at.perspective, in_range }
+    }
+}
+
+/// Projects boxes given as `min` and `max` (axis, lane) into `window` (image coordinates).
+#[inline(always)]
+pub fn project_boxes<S: Simd>(
+    simd: S,
+    set: &BoxSet,
+    min: &[[f32; 16]; 3],
+    max: &[[f32; 16]; 3],
+    window: Rect,
+) -> ProjectedBoxes {
+    if !set.in_range {
+        return everywhere(window);
+    }
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let [x, y] = [&set.x, &set.y].map(|row| corners(simd, row, min, max));
+    let (lowest, depth, safe, before_near);
+    let mut low = [splat(0.0); 2];
+    let mut high = [splat(0.0); 2];
+    if set.perspective {
+        let w = corners(simd, &set.w, min, max);
+        lowest = w[1..].iter().fold(w[0], |m, &v| m.min(v)) - set.error[2];
+        let highest = w[1..].iter().fold(w[0], |m, &v| m.max(v)) + set.error[2];
+        let near = splat(set.d[3]);
+        // Relative error of W below 1/8, else the box counts as crossing the near plane.
+        safe = lowest.simd_gt(near.max(splat(set.error[2] * 8.0)));
+        before_near = highest.simd_ge(near * 0.999_999);
+        depth = near / lowest * 1.000_001;
+        for c in 0..8 {
+            let reciprocal = splat(1.0) / w[c];
+            for (k, p) in [&x, &y].into_iter().enumerate() {
+                let q = p[c] * reciprocal;
+                (low[k], high[k]) = if c == 0 { (q, q) } else { (low[k].min(q), high[k].max(q)) };
+            }
+        }
+    } else {
+        let d = corners(simd, &set.d, min, max);
+        let nearest = d[1..].iter().fold(d[0], |m, &v| m.max(v)) + set.error[3];
+        lowest = splat(1.0);
+        safe = nearest.simd_le(splat(1.0));
+        let farthest = d[1..].iter().fold(d[0], |m, &v| m.min(v)) - set.error[3];
+        before_near = farthest.simd_le(splat(1.0)) & nearest.simd_gt(splat(0.0));
+        depth = nearest;
+        for (k, p) in [&x, &y].into_iter().enumerate() {
+            low[k] = p[1..].iter().fold(p[0], |m, &v| m.min(v));
+            high[k] = p[1..].iter().fold(p[0], |m, &v| m.max(v));
+        }
+    }
+    let mut edges = [splat(0.0); 4];
+    let mut meets = before_near;
+    let sizes = [(window.left, window.right), (window.top, window.bottom)];
+    for k in 0..2 {
+        let (first, last) = (sizes[k].0 as f32, (sizes[k].1 - 1) as f32);
+        let largest = low[k].abs().max(high[k].abs());
+        let margin = (largest * set.error[2] + set.error[k]) / lowest + largest * (1.0 / (1 << 21) as f32);
+        // Pixel p's centre is p + 1/2; 1/256 covers snapping.
+        let from = (low[k] - margin - (0.5 + 1.0 / 256.0)).ceil().max(splat(first));
+        let to = (high[k] + margin - (0.5 - 1.0 / 256.0)).floor().min(splat(last));
+        // The whole window where the box may cross the near plane.
+        edges[k] = safe.select(from, splat(first)) - first;
+        edges[k + 2] = safe.select(to, splat(last)) - first;
+        meets &= edges[k].simd_le(edges[k + 2]);
+    }
+    // Boxes that cross the near plane are still tested against the window's four sides.
+    let crossing = !safe & meets;
+    let mut alive = meets.to_bitmask() as u16;
+    if crossing.any_true() {
+        alive &= !outside_sides(simd, set, &x, &y, min, max, window) | !(crossing.to_bitmask() as u16);
+    }
+    let store = |v: f32x16<S>| {
+        let mut out = [0.0; 16];
+        v.store_slice(&mut out);
+        out
+    };
+    ProjectedBoxes {
+        left: store(edges[0]),
+        top: store(edges[1]),
+        right: store(edges[2]),
+        bottom: store(edges[3]),
+        depth: store(safe.select(depth, splat(f32::INFINITY))),
+        alive,
+    }
+}
+
+/// The answer that is always safe.
+#[inline(never)]
+fn everywhere(window: Rect) -> ProjectedBoxes {
+    ProjectedBoxes {
+        left: [0.0; 16],
+        top: [0.0; 16],
+        right: [(window.right - window.left - 1) as f32; 16],
+        bottom: [(window.bottom - window.top - 1) as f32; 16],
+        depth: [f32::INFINITY; 16],
+        alive: 0xFFFF,
+    }
+}
+
+/// Boxes that lie wholly beyond one of the window's sides (planes through the eye).
+#[inline(always)]
+fn outside_sides<S: Simd>(
+    simd: S,
+    set: &BoxSet,
+    x: &[f32x16<S>; 8],
+    y: &[f32x16<S>; 8],
+    min: &[[f32; 16]; 3],
+    max: &[[f32; 16]; 3],
+    window: Rect,
+) -> u16 {
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let w = if set.perspective { corners(simd, &set.w, min, max) } else { [splat(1.0); 8] };
+    let mut outside = 0u16;
+    let sides = [
+        (x, set.error[0], window.left, window.right),
+        (y, set.error[1], window.top, window.bottom),
+    ];
+    for (p, error, first, last) in sides {
+        for (bound, sign) in [(first as f32, 1.0f32), (last as f32, -1.0f32)] {
+            let slack = error + bound.abs() * set.error[2];
+            let mut most = splat(f32::NEG_INFINITY);
+            for c in 0..8 {
+                most = most.max((p[c] - w[c] * bound) * sign);
+            }
+            // Twice the bound, for the rounding of the difference itself.
+            outside |= most.simd_lt(splat(-2.0 * slack)).to_bitmask() as u16;
+        }
+    }
+    outside
+}
+
+/// `row · corner` for the eight corners of sixteen boxes; bit 0 of the corner is x, bit 1 y, bit 2 z.
+#[inline(always)]
+fn corners<S: Simd>(simd: S, row: &[f32; 4], min: &[[f32; 16]; 3], max: &[[f32; 16]; 3]) -> [f32x16<S>; 8] {
+    let term = |axis: usize, from: &[[f32; 16]; 3]| f32x16::from_slice(simd, &from[axis]) * row[axis];
+    let x = [term(0, min) + row[3], term(0, max) + row[3]];
+    let y = [term(1, min), term(1, max)];
+    let z = [term(2, min), term(2, max)];
+    let xy = [x[0] + y[0], x[1] + y[0], x[0] + y[1], x[1] + y[1]];
+    [
+        xy[0] + z[0],
+        xy[1] + z[0],
+        xy[2] + z[0],
+        xy[3] + z[0],
+        xy[0] + z[1],
+        xy[1] + z[1],
+        xy[2] + z[1],
+        xy[3] + z[1],
+    ]
+}

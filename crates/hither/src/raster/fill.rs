@@ -1,0 +1,471 @@
+//! Filling triangles: hierarchical coverage and depth, sixteen cells at a time.
+//!
+//! ```text
+//! large   64-pixel cells → 16 tiles each: edges and z-pyramid → a mask of tiles
+//! medium  tiles → 16 blocks each: edges and z-pyramid → masks of touched and of covered blocks
+//! small   (up to 2×2 blocks) straight to blocks
+//! block   16 pixels: edges, depth, compare, write; ties to the smaller id
+//! ```
+//!
+//! *Coverage.* An edge function is `E = A·(X − x) + B·(Y − y) + bias` on snapped coordinates, and a pixel
+//! is inside where `E ≥ 0` for all three; `bias` is −1 on edges that are neither top nor left, else 0.
+//! At pixel centres `X` steps by 256, so `e = ⌊E / 256⌋ = A·px + B·py + C` has the same sign and exact
+//! integer steps. `C` needs 64 bits; within a tile the steps need 28, so a tile's origin is saturated to
+//! ±2³⁰ without changing a sign.
+//!
+//! *Depth.* A block's origin is evaluated in f64 from the plane and rounded once; pixels add `a·dx + b·dy`
+//! in f32 and are clamped to the corners' range. These operations depend on the block's place in the
+//! image only, so every path gives the same bits. The bound used to skip a block or tile is the plane's
+//! largest value there plus [`plane_margin`], and never above the corners' largest depth.
+
+use super::clip::clip;
+use super::pyramid::{Sixteen, Target, cell_mask};
+use super::setup::{Lanes, ScreenTriangle, TriangleBlock, set_up};
+use super::transform::ScreenFromObject;
+use crate::conventions::SurfaceId;
+use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
+
+/// How a block of triangles is drawn.
+pub struct Drawing<'a> {
+    /// The instance its ids name.
+    pub instance: u32,
+    /// Its transform.
+    pub at: &'a ScreenFromObject,
+    /// Whether the z-pyramid may save work; else every covered pixel is visited.
+    pub hierarchical: bool,
+}
+
+/// What drawing one block of triangles came to.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BlockCounts {
+    /// Triangles that face the eye.
+    pub front_facing: u32,
+    /// Triangles that were rasterised.
+    pub drawn: u32,
+    /// Whether a depth sample was written.
+    pub wrote: bool,
+}
+
+/// Draws up to sixteen triangles. `is_hole(lane, x, y)` says whether a masked lane has a hole at an image
+/// pixel's centre; it is asked only of pixels that would otherwise be written.
+#[inline(always)]
+pub fn draw_block<S: Simd>(
+    simd: S,
+    target: &mut Target,
+    block: &TriangleBlock,
+    drawing: &Drawing,
+    is_hole: &mut dyn FnMut(usize, i32, i32) -> bool,
+) -> BlockCounts {
+    let window = super::Rect {
+        left: target.left,
+        top: target.top,
+        right: target.left + target.width,
+        bottom: target.top + target.height,
+    };
+    let lanes: Lanes = set_up(simd, block, drawing.at, window);
+    let mut counts = BlockCounts { front_facing: lanes.front_facing.count_ones(), drawn: 0, wrote: false };
+    let mut rest = lanes.draw;
+    while rest != 0 {
+        let lane = rest.trailing_zeros() as usize;
+        rest &= rest - 1;
+        let triangle = lanes.get(lane);
+        draw_lane(simd, target, block, drawing, lane, &triangle, is_hole, &mut counts);
+    }
+    if lanes.clip != 0 {
+        draw_clipped(simd, target, block, drawing, lanes.clip, is_hole, &mut counts);
+    }
+    counts
+}
+
+#[inline(never)]
+fn draw_clipped<S: Simd>(
+    simd: S,
+    target: &mut Target,
+    block: &TriangleBlock,
+    drawing: &Drawing,
+    mut lanes: u16,
+    is_hole: &mut dyn FnMut(usize, i32, i32) -> bool,
+    counts: &mut BlockCounts,
+) {
+    let window = super::Rect {
+        left: target.left,
+        top: target.top,
+        right: target.left + target.width,
+        bottom: target.top + target.height,
+    };
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes - 1;
+        let two_sided = block.two_sided & (1 << lane) != 0;
+        let pieces = clip(&block.corners(lane), drawing.at, two_sided, window);
+        counts.front_facing += u32::from(pieces.faces_eye);
+        for piece in pieces.triangles() {
+            simd.vectorize(
+                #[inline(always)]
+                || draw_lane(simd, target, block, drawing, lane, piece, is_hole, counts),
+            );
+        }
+    }
+}
+
+#[expect(clippy::too_many_arguments, reason = "the inner step of one loop, split off to be called twice")]
+#[inline(always)]
+fn draw_lane<S: Simd>(
+    simd: S,
+    target: &mut Target,
+    block: &TriangleBlock,
+    drawing: &Drawing,
+    lane: usize,
+    triangle: &ScreenTriangle,
+    is_hole: &mut dyn FnMut(usize, i32, i32) -> bool,
+    counts: &mut BlockCounts,
+) {
+    let id = SurfaceId { instance: drawing.instance, triangle: block.triangle[lane] };
+    let masked = block.masked & (1 << lane) != 0;
+    let mut hole = |x: i32, y: i32| is_hole(lane, x, y);
+    let drawn = match (drawing.hierarchical, masked) {
+        (true, false) => fill::<S, true, false>(simd, target, triangle, id, &mut hole),
+        (true, true) => fill::<S, true, true>(simd, target, triangle, id, &mut hole),
+        (false, false) => fill::<S, false, false>(simd, target, triangle, id, &mut hole),
+        (false, true) => fill::<S, false, true>(simd, target, triangle, id, &mut hole),
+    };
+    counts.drawn += u32::from(drawn.rasterised);
+    counts.wrote |= drawn.wrote;
+}
+
+#[derive(Default)]
+struct Filled {
+    rasterised: bool,
+    wrote: bool,
+}
+
+/// An edge as a function of window pixels: inside where `a·x + b·y + c ≥ 0`.
+#[derive(Clone, Copy)]
+struct Edge {
+    a: i32,
+    b: i32,
+    c: i64,
+}
+
+impl Edge {
+    #[inline(always)]
+    fn at(&self, x: i32, y: i32) -> i64 {
+        i64::from(self.a) * i64::from(x) + i64::from(self.b) * i64::from(y) + self.c
+    }
+
+    /// The value at a window pixel, saturated so that a tile's steps cannot overflow.
+    #[inline(always)]
+    fn at_saturated(&self, x: i32, y: i32) -> i32 {
+        self.at(x, y).clamp(-(1 << 30), (1 << 30) - 1) as i32
+    }
+
+    /// Largest step from a cell's origin pixel to one of its pixels.
+    #[inline(always)]
+    fn reach_up(&self, last: i32) -> i32 {
+        (self.a.max(0) + self.b.max(0)) * last
+    }
+
+    /// Smallest (most negative) such step.
+    #[inline(always)]
+    fn reach_down(&self, last: i32) -> i32 {
+        (self.a.min(0) + self.b.min(0)) * last
+    }
+}
+
+#[inline(always)]
+fn edges(t: &ScreenTriangle, target: &Target) -> [Edge; 3] {
+    [(0, 1), (1, 2), (2, 0)].map(|(i, j)| {
+        let (dx, dy) = (t.x[j] - t.x[i], t.y[j] - t.y[i]);
+        let (a, b) = (-dy, dx);
+        // Clockwise on a y-down screen: left edges go up, top edges go right.
+        let owned = dy < 0 || (dy == 0 && dx > 0);
+        let x = i64::from(128 + 256 * target.left - t.x[i]);
+        let y = i64::from(128 + 256 * target.top - t.y[i]);
+        let e = i64::from(a) * x + i64::from(b) * y - i64::from(!owned);
+        Edge { a, b, c: e >> 8 }
+    })
+}
+
+/// A triangle while it is filled: everything that stays the same from block to block.
+struct Filling<S: Simd> {
+    edges: [Edge; 3],
+    edge_steps: [i32x16<S>; 3],
+    depth_steps: f32x16<S>,
+    depth_min: f32x16<S>,
+    depth_max: f32x16<S>,
+    /// Depth plane over window pixels.
+    plane: [f64; 3],
+    slot: u32,
+    id: SurfaceId,
+    wrote: bool,
+}
+
+impl<S: Simd> Filling<S> {
+    /// The plane at a window pixel, rounded once. Blocks pass their first pixel.
+    ///
+    /// The bits must not depend on the window: `plane` is shifted by whole multiples of 16 pixels, which
+    /// is not exact in f64, so the shift happens here, on the integer.
+    #[inline(always)]
+    fn plane_at(&self, target: &Target, x: i32, y: i32) -> f32 {
+        let (x, y) = (f64::from(x + target.left), f64::from(y + target.top));
+        ((self.plane[0] * x + self.plane[1] * y) + self.plane[2]) as f32
+    }
+
+    /// More than any pixel's rounding error over a cell whose origin has plane value `origin`: at most
+    /// four roundings of 2⁻²⁴ each of the origin and of steps up to `last` pixels.
+    #[inline(always)]
+    fn plane_margin(&self, origin: f32, last: f32) -> f32 {
+        let slope = (self.plane[0].abs() + self.plane[1].abs()) as f32;
+        (origin.abs() + slope * last) * (1.0 / (1 << 20) as f32)
+    }
+
+    #[inline(always)]
+    fn plane_rise(&self, last: f64) -> f32 {
+        ((self.plane[0].max(0.0) + self.plane[1].max(0.0)) * last) as f32
+    }
+}
+
+#[inline(always)]
+fn fill<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
+    simd: S,
+    target: &mut Target,
+    t: &ScreenTriangle,
+    id: SurfaceId,
+    is_hole: &mut dyn FnMut(i32, i32) -> bool,
+) -> Filled {
+    let left = (t.bounds.left - target.left) >> 2;
+    let top = (t.bounds.top - target.top) >> 2;
+    let right = (t.bounds.right - 1 - target.left) >> 2;
+    let bottom = (t.bounds.bottom - 1 - target.top) >> 2;
+    let small = right - left < 2 && bottom - top < 2;
+
+    // A small triangle that every block it meets hides is dropped before anything else is computed.
+    let mut blocks = 0u32;
+    if small {
+        for (i, (bx, by)) in [(left, top), (right, top), (left, bottom), (right, bottom)].into_iter().enumerate() {
+            let repeated = (i & 1 != 0 && right == left) || (i & 2 != 0 && bottom == top);
+            if !repeated {
+                let tile = (by >> 2) as usize * target.tiles_x + (bx >> 2) as usize;
+                let block = ((by & 3) * 4 + (bx & 3)) as usize;
+                if !HIERARCHICAL || t.depth_max >= target.block_minima(tile)[block] {
+                    blocks |= 1 << i;
+                }
+                if HIERARCHICAL && target.visits.is_some() {
+                    target.count_polygon_visit((bx * 4, by * 4), 4, 1);
+                }
+            }
+        }
+        if blocks == 0 {
+            return Filled::default();
+        }
+    }
+
+    let edges = edges(t, target);
+    let column = i32x16::from_slice(simd, &COLUMN);
+    let row = i32x16::from_slice(simd, &ROW);
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let mut filling = Filling {
+        edges,
+        edge_steps: edges.map(|e| column * e.a + row * e.b),
+        depth_steps: splat(t.plane[0] as f32) * f32x16::from_slice(simd, &COLUMN_F)
+            + splat(t.plane[1] as f32) * f32x16::from_slice(simd, &ROW_F),
+        depth_min: splat(t.depth_min),
+        depth_max: splat(t.depth_max),
+        plane: t.plane,
+        slot: target.surfaces.len() as u32,
+        id,
+        wrote: false,
+    };
+    let f = &mut filling;
+    if small {
+        while blocks != 0 {
+            let i = blocks.trailing_zeros() as i32;
+            blocks &= blocks - 1;
+            let (bx, by) = (if i & 1 == 0 { left } else { right }, if i & 2 == 0 { top } else { bottom });
+            fill_block::<S, HIERARCHICAL, MASKED>(simd, target, f, bx, by, false, is_hole);
+        }
+    } else {
+        let (left, top, right, bottom) = (left >> 2, top >> 2, right >> 2, bottom >> 2);
+        let large = right - left >= 6 || bottom - top >= 6;
+        if large {
+            for cell_y in top >> 2..=bottom >> 2 {
+                for cell_x in left >> 2..=right >> 2 {
+                    let within = cell_mask(
+                        (left - cell_x * 4).max(0),
+                        (top - cell_y * 4).max(0),
+                        (right - cell_x * 4).min(3),
+                        (bottom - cell_y * 4).min(3),
+                    );
+                    let mut tiles =
+                        within & tiles_of_cell::<S, HIERARCHICAL>(simd, target, f, t.depth_max, cell_x, cell_y);
+                    while tiles != 0 {
+                        let c = tiles.trailing_zeros() as i32;
+                        tiles &= tiles - 1;
+                        let (x, y) = (cell_x * 4 + (c & 3), cell_y * 4 + (c >> 2));
+                        fill_tile::<S, HIERARCHICAL, MASKED>(simd, target, f, t.depth_max, x, y, is_hole);
+                    }
+                }
+            }
+        } else {
+            for y in top..=bottom {
+                for x in left..=right {
+                    fill_tile::<S, HIERARCHICAL, MASKED>(simd, target, f, t.depth_max, x, y, is_hole);
+                }
+            }
+        }
+    }
+    let wrote = filling.wrote;
+    if wrote {
+        target.surfaces.push(id);
+    }
+    Filled { rasterised: true, wrote }
+}
+
+const COLUMN: [i32; 16] = [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3];
+const ROW: [i32; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3];
+const COLUMN_F: [f32; 16] = [0., 1., 2., 3., 0., 1., 2., 3., 0., 1., 2., 3., 0., 1., 2., 3.];
+const ROW_F: [f32; 16] = [0., 0., 0., 0., 1., 1., 1., 1., 2., 2., 2., 2., 3., 3., 3., 3.];
+
+/// Which of a 64-pixel cell's tiles the triangle may show in.
+#[inline(always)]
+fn tiles_of_cell<S: Simd, const HIERARCHICAL: bool>(
+    simd: S,
+    target: &mut Target,
+    f: &Filling<S>,
+    depth_max: f32,
+    cell_x: i32,
+    cell_y: i32,
+) -> u32 {
+    // A cell's steps need 30 bits, so edges are taken 1/16 as fine: sums of floors are at most 1 short.
+    let mut outside = i32x16::splat(simd, 0);
+    for (edge, steps) in f.edges.iter().zip(f.edge_steps) {
+        let origin = ((edge.at(cell_x * 64, cell_y * 64) >> 4) + (i64::from(edge.reach_up(15)) >> 4) + 2)
+            .clamp(-(1 << 30), (1 << 30) - 1) as i32;
+        outside |= steps + origin;
+    }
+    let mut tiles = !(outside.simd_lt(i32x16::splat(simd, 0)).to_bitmask() as u32) & 0xFFFF;
+    if HIERARCHICAL {
+        let z = f.plane_at(target, cell_x * 64, cell_y * 64);
+        let bound = z + f.plane_rise(15.0) + f.plane_margin(z, 63.0);
+        let bounds = (f.depth_steps * 16.0 + bound).min(f32x16::splat(simd, depth_max));
+        if let Some(minima) = target.tile_minima(simd, cell_x as usize, cell_y as usize) {
+            let minima = f32x16::from_slice(simd, minima);
+            tiles &= bounds.simd_ge(minima).to_bitmask() as u32;
+        }
+    }
+    if target.visits.is_some() && HIERARCHICAL {
+        target.count_polygon_visit((cell_x * 64, cell_y * 64), 16, 0xFFFF);
+    }
+    tiles
+}
+
+#[inline(always)]
+fn fill_tile<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
+    simd: S,
+    target: &mut Target,
+    f: &mut Filling<S>,
+    depth_max: f32,
+    tile_x: i32,
+    tile_y: i32,
+    is_hole: &mut dyn FnMut(i32, i32) -> bool,
+) {
+    let tile = tile_y as usize * target.tiles_x + tile_x as usize;
+    let (x, y) = (tile_x * 16, tile_y * 16);
+    let mut outside = i32x16::splat(simd, 0);
+    let mut partial = i32x16::splat(simd, 0);
+    for (edge, steps) in f.edges.iter().zip(f.edge_steps) {
+        let at_blocks = (steps << 2) + edge.at_saturated(x, y);
+        outside |= at_blocks + edge.reach_up(3);
+        partial |= at_blocks + edge.reach_down(3);
+    }
+    let zero = i32x16::splat(simd, 0);
+    let mut blocks = !(outside.simd_lt(zero).to_bitmask() as u32) & 0xFFFF;
+    let whole = !(partial.simd_lt(zero).to_bitmask() as u32);
+    if HIERARCHICAL {
+        let z = f.plane_at(target, x, y);
+        let bound = z + f.plane_rise(3.0) + f.plane_margin(z, 15.0);
+        let bounds = (f.depth_steps * 4.0 + bound).min(f32x16::splat(simd, depth_max));
+        let minima = f32x16::from_slice(simd, target.block_minima(tile));
+        blocks &= bounds.simd_ge(minima).to_bitmask() as u32;
+        if target.visits.is_some() {
+            target.count_polygon_visit((x, y), 4, 0xFFFF);
+        }
+    }
+    while blocks != 0 {
+        let c = blocks.trailing_zeros() as i32;
+        blocks &= blocks - 1;
+        let (bx, by) = (tile_x * 4 + (c & 3), tile_y * 4 + (c >> 2));
+        fill_block::<S, HIERARCHICAL, MASKED>(simd, target, f, bx, by, whole & (1 << c) != 0, is_hole);
+    }
+}
+
+#[inline(always)]
+fn fill_block<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
+    simd: S,
+    target: &mut Target,
+    f: &mut Filling<S>,
+    block_x: i32,
+    block_y: i32,
+    whole: bool,
+    is_hole: &mut dyn FnMut(i32, i32) -> bool,
+) {
+    let tile = (block_y >> 2) as usize * target.tiles_x + (block_x >> 2) as usize;
+    let block = ((block_y & 3) * 4 + (block_x & 3)) as usize;
+    let (x, y) = (block_x * 4, block_y * 4);
+    let covered = if whole {
+        0xFFFF
+    } else {
+        let mut outside = i32x16::splat(simd, 0);
+        for (edge, steps) in f.edges.iter().zip(f.edge_steps) {
+            outside |= steps + edge.at_saturated(x, y);
+        }
+        !(outside.simd_lt(i32x16::splat(simd, 0)).to_bitmask() as u32) & 0xFFFF
+    };
+    if target.visits.is_some() {
+        target.count_polygon_visit((x, y), 1, covered);
+    }
+    if covered == 0 {
+        return;
+    }
+    target.touch(tile);
+    let at = tile * 16 + block;
+    let z = (f.depth_steps + f.plane_at(target, x, y)).max(f.depth_min).min(f.depth_max);
+    let old = f32x16::from_slice(simd, &target.depth[at].0);
+    let mut write = z.simd_gt(old).to_bitmask() as u32 & covered;
+    let tied = z.simd_eq(old).to_bitmask() as u32 & covered;
+    if tied != 0 {
+        write |= win_ties(target, f.id, at, tied, z.simd_gt(f32x16::splat(simd, 0.0)).to_bitmask() as u32);
+    }
+    if MASKED {
+        let candidates = write;
+        for p in (0..16).filter(|p| candidates & (1 << p) != 0) {
+            if is_hole(target.left + x + (p & 3), target.top + y + (p >> 2)) {
+                write &= !(1 << p);
+            }
+        }
+    }
+    if write == 0 {
+        return;
+    }
+    f.wrote = true;
+    target.counters.pixels_written += u64::from(write.count_ones());
+    let mask = mask32x16::from_bitmask(simd, u64::from(write));
+    let new = mask.select(z, old);
+    new.store_slice(&mut target.depth[at].0);
+    let ids: &mut Sixteen<u32> = &mut target.id[at];
+    let old_ids = fearless_simd::u32x16::from_slice(simd, &ids.0);
+    mask.select(fearless_simd::u32x16::splat(simd, f.slot), old_ids).store_slice(&mut ids.0);
+    if HIERARCHICAL {
+        let min = new.reduce_min();
+        target.raise_block_minimum(tile, block, min);
+    }
+}
+
+/// Of the pixels that hold exactly this depth, those whose surface has a larger id.
+#[inline(never)]
+fn win_ties(target: &Target, id: SurfaceId, at: usize, tied: u32, drawn: u32) -> u32 {
+    (0..16)
+        .filter(|p| tied & drawn & (1 << p) != 0)
+        .filter(|&p| id < target.surfaces[target.id[at].0[p] as usize])
+        .fold(0, |won, p| won | 1 << p)
+}

@@ -1,0 +1,458 @@
+//! A window's depth buffer in blocks, and the z-pyramid above it [Greene 1995, §3.3.2], kept lazily.
+//!
+//! Level 0 of the pyramid holds the farthest (smallest) depth of each 4×4-pixel block and is exact after
+//! every write. Higher levels are refreshed when a test asks for them: a write that raises a block's
+//! minimum marks the path to the root stale, stopping at the first ancestor already marked.
+//!
+//! A tile's pixels are initialised on first touch, so that clearing a window costs a sixteenth of its
+//! pixels. Pixels beyond the image's right and bottom border hold +∞: nothing is drawn there, and they
+//! never hold a minimum down.
+
+use crate::conventions::SurfaceId;
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+
+/// A half-open rectangle of pixels, in window coordinates unless said otherwise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rect {
+    /// First column.
+    pub left: i32,
+    /// First row.
+    pub top: i32,
+    /// One past the last column.
+    pub right: i32,
+    /// One past the last row.
+    pub bottom: i32,
+}
+
+/// What a window's tiling did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TargetCounters {
+    /// Depth samples written, overwriting included.
+    pub pixels_written: u64,
+}
+
+/// Sixteen children, one cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Sixteen<T>(pub [T; 16]);
+
+/// Minima of one level, grouped by parent.
+#[derive(Debug, Default)]
+struct PyramidLevel {
+    columns: usize,
+    rows: usize,
+    min: Vec<Sixteen<f32>>,
+    /// Bit `c`: child `c`'s minimum is out of date (too far, hence still a bound).
+    stale: Vec<u16>,
+}
+
+/// Per-pixel visit counts, for pictures of complexity.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Visits {
+    pub cubes: Vec<f32>,
+    pub polygons: Vec<f32>,
+}
+
+/// A window of the image: depth, ids and z-pyramid.
+#[derive(Debug)]
+pub struct Target {
+    /// First image column, a multiple of [`super::TILE`].
+    pub left: i32,
+    /// First image row, a multiple of [`super::TILE`].
+    pub top: i32,
+    /// Width, pixels.
+    pub width: i32,
+    /// Height, pixels.
+    pub height: i32,
+    /// What was done since the last [`Target::clear`].
+    pub counters: TargetCounters,
+    pub(super) tiles_x: usize,
+    tiles_y: usize,
+    pub(super) depth: Vec<Sixteen<f32>>,
+    pub(super) id: Vec<Sixteen<u32>>,
+    touched: Vec<bool>,
+    levels: Vec<PyramidLevel>,
+    /// What the numbers in `id` stand for.
+    pub(super) surfaces: Vec<SurfaceId>,
+    pub(crate) visits: Option<Box<Visits>>,
+}
+
+impl Target {
+    /// A window with its top left corner at image pixel (`left`, `top`), cleared.
+    pub fn new(left: u32, top: u32, width: u32, height: u32) -> Target {
+        assert!(left.is_multiple_of(super::TILE) && top.is_multiple_of(super::TILE), "windows start on tiles");
+        assert!(width > 0 && height > 0, "a window has pixels");
+        let (tiles_x, tiles_y) = (width.div_ceil(16) as usize, height.div_ceil(16) as usize);
+        let blocks = tiles_x * tiles_y * 16;
+        let mut levels = Vec::new();
+        let (mut columns, mut rows) = (tiles_x, tiles_y);
+        loop {
+            let parents = columns * rows;
+            levels.push(PyramidLevel {
+                columns,
+                rows,
+                min: vec![Sixteen([0.0; 16]); parents],
+                stale: vec![0; parents],
+            });
+            if parents == 1 {
+                break;
+            }
+            (columns, rows) = (columns.div_ceil(4), rows.div_ceil(4));
+        }
+        let mut target = Target {
+            left: left as i32,
+            top: top as i32,
+            width: width as i32,
+            height: height as i32,
+            counters: TargetCounters::default(),
+            tiles_x,
+            tiles_y,
+            depth: vec![Sixteen([0.0; 16]); blocks],
+            id: vec![Sixteen([0; 16]); blocks],
+            touched: vec![false; tiles_x * tiles_y],
+            levels,
+            surfaces: Vec::new(),
+            visits: None,
+        };
+        target.clear();
+        target
+    }
+
+    /// Makes the window empty again.
+    pub fn clear(&mut self) {
+        self.counters = TargetCounters::default();
+        self.surfaces.clear();
+        self.touched.fill(false);
+        let (mut children_x, mut children_y) =
+            ((self.width as usize).div_ceil(4), (self.height as usize).div_ceil(4));
+        for level in &mut self.levels {
+            level.stale.fill(0);
+            level.min.fill(Sixteen([0.0; 16]));
+            // Children outside the window never hold their parent's minimum down.
+            for parent_y in 0..level.rows {
+                for parent_x in 0..level.columns {
+                    let inside_x = children_x - parent_x * 4;
+                    let inside_y = children_y - parent_y * 4;
+                    if inside_x < 4 || inside_y < 4 {
+                        let cell = &mut level.min[parent_y * level.columns + parent_x];
+                        for c in 0..16 {
+                            if c % 4 >= inside_x || c / 4 >= inside_y {
+                                cell.0[c] = f32::INFINITY;
+                            }
+                        }
+                    }
+                }
+            }
+            (children_x, children_y) = (level.columns, level.rows);
+        }
+    }
+
+    /// The whole window as a rectangle.
+    pub fn bounds(&self) -> Rect {
+        Rect { left: 0, top: 0, right: self.width, bottom: self.height }
+    }
+
+    /// Depth at a pixel of the window; 0 where nothing was drawn.
+    pub fn depth_at(&self, x: u32, y: u32) -> f32 {
+        let (block, pixel) = self.locate(x, y);
+        if self.touched[block / 16] { self.depth[block].0[pixel] } else { 0.0 }
+    }
+
+    /// The surface at a pixel of the window.
+    pub fn surface_at(&self, x: u32, y: u32) -> Option<SurfaceId> {
+        let (block, pixel) = self.locate(x, y);
+        let drawn = self.touched[block / 16] && self.depth[block].0[pixel] > 0.0;
+        drawn.then(|| self.surfaces[self.id[block].0[pixel] as usize])
+    }
+
+    fn locate(&self, x: u32, y: u32) -> (usize, usize) {
+        assert!((x as i32) < self.width && (y as i32) < self.height, "({x}, {y}) is outside the window");
+        let tile = (y / 16) as usize * self.tiles_x + (x / 16) as usize;
+        let block = tile * 16 + (y / 4 % 4 * 4 + x / 4 % 4) as usize;
+        (block, (y % 4 * 4 + x % 4) as usize)
+    }
+
+    /// Whether nothing at or behind `depth` could be seen anywhere in `rect`: Greene's fast
+    /// bounding-rectangle test. Exact for the rectangle: `false` means that at least one of its pixels
+    /// holds `depth` or something farther.
+    ///
+    /// `rect` is clipped to the window; an empty one is hidden. Cost: a few cells along its border.
+    pub fn is_hidden(&mut self, level: Level, rect: Rect, depth: f32) -> bool {
+        dispatch!(level, simd => self.hides(simd, rect, depth))
+    }
+
+    #[inline(always)]
+    pub(crate) fn hides<S: Simd>(&mut self, simd: S, rect: Rect, depth: f32) -> bool {
+        let left = rect.left.max(0);
+        let top = rect.top.max(0);
+        let right = rect.right.min(self.width) - 1;
+        let bottom = rect.bottom.min(self.height) - 1;
+        if left > right || top > bottom {
+            return true;
+        }
+        // Finest level at which the rectangle meets at most 2×2 parents: parents at level k have side
+        // 4^(k+2), and an extent below 4^(k+2) touches at most two of them.
+        let extent = (right - left).max(bottom - top) as u32;
+        let log4 = (31 - (extent | 15).leading_zeros()) / 2;
+        let top_level = (log4 as usize - 1).min(self.levels.len() - 1);
+        let shift = 2 * (top_level as u32 + 2);
+        for parent_y in (top >> shift)..=(bottom >> shift) {
+            for parent_x in (left >> shift)..=(right >> shift) {
+                let inner = [left, top, right, bottom];
+                if self.shows_in(simd, top_level, parent_x as usize, parent_y as usize, inner, depth) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// Whether some pixel of `[left, top, right, bottom]` (inclusive) inside this parent cell holds
+    /// `depth` or something farther.
+    #[inline(always)]
+    fn shows_in<S: Simd>(
+        &mut self,
+        simd: S,
+        level: usize,
+        parent_x: usize,
+        parent_y: usize,
+        rect: [i32; 4],
+        depth: f32,
+    ) -> bool {
+        let wanted = f32x16::splat(simd, depth);
+        // An explicit stack: at most 2×2 cells are open a level along a border, 16 in the worst case.
+        let mut stack = [(0u8, 0u16, 0u16); 16 * 8];
+        stack[0] = (level as u8, parent_x as u16, parent_y as u16);
+        let mut open = 1;
+        while open > 0 {
+            open -= 1;
+            let (level, px, py) = (stack[open].0 as usize, stack[open].1 as usize, stack[open].2 as usize);
+            let parent = py * self.levels[level].columns + px;
+            if self.levels[level].stale[parent] != 0 {
+                self.refresh(simd, level, parent);
+            }
+            let shift = 2 * (level as u32 + 1);
+            // The rectangle in children of this parent, and the children it covers whole.
+            let base_x = (px as i32) << 2;
+            let base_y = (py as i32) << 2;
+            let x0 = ((rect[0] >> shift) - base_x).max(0);
+            let y0 = ((rect[1] >> shift) - base_y).max(0);
+            let x1 = ((rect[2] >> shift) - base_x).min(3);
+            let y1 = ((rect[3] >> shift) - base_y).min(3);
+            let values = f32x16::from_slice(simd, &self.levels[level].min[parent].0);
+            let mut bits = values.simd_le(wanted).to_bitmask() as u32 & cell_mask(x0, y0, x1, y1);
+            self.count_cube_visit(level, parent, cell_mask(x0, y0, x1, y1));
+            if bits == 0 {
+                continue;
+            }
+            let unit = 1i32 << shift;
+            let whole_x0 = ((rect[0] + unit - 1) >> shift) - base_x;
+            let whole_y0 = ((rect[1] + unit - 1) >> shift) - base_y;
+            let whole_x1 = ((rect[2] + 1) >> shift) - base_x - 1;
+            let whole_y1 = ((rect[3] + 1) >> shift) - base_y - 1;
+            let whole = cell_mask(whole_x0.max(0), whole_y0.max(0), whole_x1.min(3), whole_y1.min(3));
+            if bits & whole != 0 {
+                return true; // a whole child's minimum is a pixel of the rectangle
+            }
+            while bits != 0 {
+                let c = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                let (cx, cy) = (px * 4 + c % 4, py * 4 + c / 4);
+                if level > 0 {
+                    stack[open] = (level as u8 - 1, cx as u16, cy as u16);
+                    open += 1;
+                } else if self.block_shows(simd, parent, c, cx as i32, cy as i32, rect, depth) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    #[inline(always)]
+    fn block_shows<S: Simd>(
+        &mut self,
+        simd: S,
+        tile: usize,
+        block: usize,
+        bx: i32,
+        by: i32,
+        rect: [i32; 4],
+        depth: f32,
+    ) -> bool {
+        if !self.touched[tile] {
+            return true;
+        }
+        let x0 = (rect[0] - bx * 4).max(0);
+        let y0 = (rect[1] - by * 4).max(0);
+        let x1 = (rect[2] - bx * 4).min(3);
+        let y1 = (rect[3] - by * 4).min(3);
+        let values = f32x16::from_slice(simd, &self.depth[tile * 16 + block].0);
+        let mask = cell_mask(x0, y0, x1, y1);
+        if let Some(visits) = &mut self.visits {
+            add_visits(&mut visits.cubes, self.width, self.height, (bx * 4, by * 4), 1, mask);
+        }
+        values.simd_le(f32x16::splat(simd, depth)).to_bitmask() as u32 & mask != 0
+    }
+
+    /// Brings the minima of `parent`'s stale children up to date.
+    #[inline(always)]
+    fn refresh<S: Simd>(&mut self, simd: S, level: usize, parent: usize) {
+        refresh_level(simd, &mut self.levels, level, parent);
+    }
+
+    /// Minima of a tile's sixteen blocks, exact.
+    #[inline(always)]
+    pub(super) fn block_minima(&self, tile: usize) -> &[f32; 16] {
+        &self.levels[0].min[tile].0
+    }
+
+    /// Minima of sixteen tiles of a 64-pixel cell; `None` where the pyramid ends below.
+    #[inline(always)]
+    pub(super) fn tile_minima<S: Simd>(&mut self, simd: S, cell_x: usize, cell_y: usize) -> Option<&[f32; 16]> {
+        if self.levels.len() < 2 {
+            return None;
+        }
+        let parent = cell_y * self.levels[1].columns + cell_x;
+        if self.levels[1].stale[parent] != 0 {
+            self.refresh(simd, 1, parent);
+        }
+        Some(&self.levels[1].min[parent].0)
+    }
+
+    /// Records a block's new minimum, higher than before.
+    #[inline(always)]
+    pub(super) fn raise_block_minimum(&mut self, tile: usize, block: usize, min: f32) {
+        let old = self.levels[0].min[tile].0[block];
+        if min > old {
+            self.levels[0].min[tile].0[block] = min;
+            self.mark_stale(tile);
+        }
+    }
+
+    #[inline(always)]
+    fn mark_stale(&mut self, tile: usize) {
+        let (mut x, mut y) = (tile % self.tiles_x, tile / self.tiles_x);
+        for level in &mut self.levels[1..] {
+            let parent = (y >> 2) * level.columns + (x >> 2);
+            let bit = 1u16 << ((y & 3) * 4 + (x & 3));
+            if level.stale[parent] & bit != 0 {
+                break;
+            }
+            level.stale[parent] |= bit;
+            (x, y) = (x >> 2, y >> 2);
+        }
+    }
+
+    /// Makes a tile's pixels readable; call before the first access in a frame.
+    #[inline(always)]
+    pub(super) fn touch(&mut self, tile: usize) {
+        if !self.touched[tile] {
+            self.initialise(tile);
+        }
+    }
+
+    #[inline(never)]
+    fn initialise(&mut self, tile: usize) {
+        self.touched[tile] = true;
+        let blocks = &mut self.depth[tile * 16..tile * 16 + 16];
+        blocks.fill(Sixteen([0.0; 16]));
+        let x = (tile % self.tiles_x) as i32 * 16;
+        let y = (tile / self.tiles_x) as i32 * 16;
+        if x + 16 > self.width || y + 16 > self.height {
+            for (b, block) in blocks.iter_mut().enumerate() {
+                for (p, z) in block.0.iter_mut().enumerate() {
+                    let px = x + (b % 4 * 4 + p % 4) as i32;
+                    let py = y + (b / 4 * 4 + p / 4) as i32;
+                    if px >= self.width || py >= self.height {
+                        *z = f32::INFINITY;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Starts or stops counting visits a pixel.
+    pub(crate) fn record_visits(&mut self, on: bool) {
+        let pixels = (self.width * self.height) as usize;
+        self.visits =
+            on.then(|| Box::new(Visits { cubes: vec![0.0; pixels], polygons: vec![0.0; pixels] }));
+    }
+
+    #[inline(always)]
+    fn count_cube_visit(&mut self, level: usize, parent: usize, mask: u32) {
+        if let Some(visits) = &mut self.visits {
+            let side = 4i32 << (2 * level);
+            let columns = self.levels[level].columns;
+            let corner = ((parent % columns) as i32 * side * 4, (parent / columns) as i32 * side * 4);
+            add_visits(&mut visits.cubes, self.width, self.height, corner, side, mask);
+        }
+    }
+
+    /// Counts a visit of sixteen children with side `side` whose parent's corner is `corner`.
+    #[inline(always)]
+    pub(super) fn count_polygon_visit(&mut self, corner: (i32, i32), side: i32, mask: u32) {
+        if let Some(visits) = &mut self.visits {
+            add_visits(&mut visits.polygons, self.width, self.height, corner, side, mask);
+        }
+    }
+}
+
+/// Brings stale minima up to date, from the leaves of the stale subtree upwards.
+#[inline(always)]
+fn refresh_level<S: Simd>(simd: S, levels: &mut [PyramidLevel], level: usize, parent: usize) {
+    // Depth-first over stale cells; a cell is computed once its own children are fresh.
+    let mut stack = [(0u8, 0u32); 16 * 8];
+    stack[0] = (level as u8, parent as u32);
+    let mut open = 1;
+    while open > 0 {
+        let (level, parent) = (stack[open - 1].0 as usize, stack[open - 1].1 as usize);
+        let stale = levels[level].stale[parent];
+        if level == 0 || stale == 0 {
+            open -= 1;
+            continue;
+        }
+        let (px, py) = (parent % levels[level].columns, parent / levels[level].columns);
+        let mut bits = stale;
+        let mut waiting = 0u16;
+        while bits != 0 {
+            let c = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let child = (py * 4 + c / 4) * levels[level - 1].columns + px * 4 + c % 4;
+            if level > 1 && levels[level - 1].stale[child] != 0 {
+                waiting |= 1 << c;
+                stack[open] = (level as u8 - 1, child as u32);
+                open += 1;
+                continue;
+            }
+            let values = f32x16::from_slice(simd, &levels[level - 1].min[child].0);
+            levels[level].min[parent].0[c] = values.reduce_min();
+        }
+        levels[level].stale[parent] = waiting;
+    }
+}
+
+/// Bits of the children x0..=x1, y0..=y1 of a 4×4 group (bit y·4 + x); none if a range is empty.
+#[inline(always)]
+pub(super) fn cell_mask(x0: i32, y0: i32, x1: i32, y1: i32) -> u32 {
+    if x0 > x1 || y0 > y1 {
+        return 0;
+    }
+    let columns = ((0xF << x0) & (0xF >> (3 - x1))) as u32 * 0x1111;
+    let rows = (0xFFFFu32 << (4 * y0)) & (0xFFFF >> (4 * (3 - y1)));
+    columns & rows
+}
+
+/// Adds 1/side² to every pixel of the children in `mask` [Greene 1995, §3.5.3].
+#[inline(never)]
+fn add_visits(plane: &mut [f32], width: i32, height: i32, corner: (i32, i32), side: i32, mask: u32) {
+    let share = 1.0 / (side * side) as f32;
+    for c in (0..16).filter(|c| mask & (1 << c) != 0) {
+        let (x0, y0) = (corner.0 + c % 4 * side, corner.1 + c / 4 * side);
+        for y in y0..(y0 + side).min(height) {
+            for x in x0..(x0 + side).min(width) {
+                plane[(y * width + x) as usize] += share;
+            }
+        }
+    }
+}

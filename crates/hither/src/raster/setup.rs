@@ -1,0 +1,284 @@
+//! Triangle setup, sixteen at a time: transform, facing, bounds, depth plane.
+//!
+//! ```text
+//! 1. transform corners in f64        X Y W D, see `ScreenFromObject`
+//! 2. set aside lanes that need clipping (near plane, guard band)
+//! 3. project, snap to 1/256 pixel    exact integers held in f64
+//! 4. area (exact), facing, pixel bounds: drop what faces away or holds no pixel centre
+//! 5. depth plane of the unsnapped corners; clamp range
+//! ```
+//!
+//! f64 throughout: a snapped coordinate is then within 2⁻³⁰ pixel of the true one before rounding, at any
+//! scale from 1e-18 to 1e18, and the cost hides behind the divisions.
+
+use super::pyramid::{Rect, Sixteen};
+use super::transform::ScreenFromObject;
+use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*};
+
+/// Up to sixteen triangles as a structure of arrays: what a leaf of a mesh's tree holds.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub struct TriangleBlock {
+    /// `corner[k][axis][lane]`, object space.
+    pub corner: [[[f32; 16]; 3]; 3],
+    /// Index of each triangle in its mesh.
+    pub triangle: [u32; 16],
+    /// Lanes in use.
+    pub lanes: u16,
+    /// Lanes whose back faces are drawn too.
+    pub two_sided: u16,
+    /// Lanes with an alpha mask: their texels may be holes.
+    pub masked: u16,
+}
+
+impl TriangleBlock {
+    /// A block without triangles.
+    pub const EMPTY: TriangleBlock = TriangleBlock {
+        corner: [[[0.0; 16]; 3]; 3],
+        triangle: [0; 16],
+        lanes: 0,
+        two_sided: 0,
+        masked: 0,
+    };
+
+    /// Corners of one lane.
+    pub fn corners(&self, lane: usize) -> [[f32; 3]; 3] {
+        self.corner.map(|c| c.map(|axis| axis[lane]))
+    }
+}
+
+/// The guard band, in pixels: coordinates inside it keep every edge function within 32 bits a tile.
+/// An image (at most 16384 wide) lies inside with at least 8192 pixels to spare on each side.
+pub(super) const GUARD_MIN: f64 = -8192.0;
+pub(super) const GUARD_MAX: f64 = 24576.0;
+
+/// Slopes beyond this belong to triangles seen edge-on; clamping keeps their arithmetic finite.
+pub(super) const MAX_SLOPE: f64 = 1e30;
+
+/// A triangle on the screen, ready to be filled.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ScreenTriangle {
+    /// Snapped corners, 1/256 pixel, in the order that makes the doubled area positive.
+    pub x: [i32; 3],
+    pub y: [i32; 3],
+    /// Image pixels whose centres the snapped bounding box holds, clipped to the window; not empty.
+    pub bounds: Rect,
+    /// Depth at the centre of image pixel (x, y) is `plane[0]·x + plane[1]·y + plane[2]`.
+    pub plane: [f64; 3],
+    /// Depths of the corners: every pixel's depth is clamped to this range.
+    pub depth_min: f32,
+    pub depth_max: f32,
+}
+
+/// Sixteen set-up triangles; lanes outside `draw` are meaningless.
+pub(super) struct Lanes {
+    x: [Sixteen<i32>; 3],
+    y: [Sixteen<i32>; 3],
+    left: Sixteen<i32>,
+    top: Sixteen<i32>,
+    right: Sixteen<i32>,
+    bottom: Sixteen<i32>,
+    plane: [[Half; 2]; 3],
+    depth_min: Sixteen<f32>,
+    pub depth_max: Sixteen<f32>,
+    /// Lanes to fill.
+    pub draw: u16,
+    /// Lanes to clip first.
+    pub clip: u16,
+    /// Lanes that face the eye (clipped ones not counted).
+    pub front_facing: u16,
+}
+
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Half([f64; 8]);
+
+impl Lanes {
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> ScreenTriangle {
+        let half = lane / 8;
+        let plane = |i: usize| self.plane[i][half].0[lane % 8];
+        ScreenTriangle {
+            x: [self.x[0].0[lane], self.x[1].0[lane], self.x[2].0[lane]],
+            y: [self.y[0].0[lane], self.y[1].0[lane], self.y[2].0[lane]],
+            bounds: Rect {
+                left: self.left.0[lane],
+                top: self.top.0[lane],
+                right: self.right.0[lane] + 1,
+                bottom: self.bottom.0[lane] + 1,
+            },
+            plane: [plane(0), plane(1), plane(2)],
+            depth_min: self.depth_min.0[lane],
+            depth_max: self.depth_max.0[lane],
+        }
+    }
+}
+
+/// Eight triangles half-way through setup.
+struct Eight<S: Simd> {
+    x: [f64x8<S>; 3],
+    y: [f64x8<S>; 3],
+    d: [f64x8<S>; 3],
+    snapped_x: [f64x8<S>; 3],
+    snapped_y: [f64x8<S>; 3],
+    clip: u16,
+}
+
+/// Adding and subtracting this rounds to a whole number, ties to even, for |v| < 2⁵¹, on every machine
+/// alike; the sum's low 32 bits are that number.
+const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
+
+#[inline(always)]
+pub(super) fn set_up<S: Simd>(simd: S, block: &TriangleBlock, at: &ScreenFromObject, window: Rect) -> Lanes {
+    let halves = widen_corners(simd, block);
+    let [low, high] = halves.map(|corners| project(simd, &corners, at));
+    let clip = (low.clip | high.clip << 8) & block.lanes;
+
+    // Exact: coordinates have 24 bits, products 48, and f64 holds 53.
+    let area = |e: &Eight<S>| {
+        (e.snapped_x[1] - e.snapped_x[0]) * (e.snapped_y[2] - e.snapped_y[0])
+            - (e.snapped_x[2] - e.snapped_x[0]) * (e.snapped_y[1] - e.snapped_y[0])
+    };
+    let zero = f64x8::splat(simd, 0.0);
+    let (area_low, area_high) = (area(&low), area(&high));
+    let positive = sixteen_bits(area_low.simd_gt(zero).to_bitmask(), area_high.simd_gt(zero).to_bitmask());
+    let negative = sixteen_bits(area_low.simd_lt(zero).to_bitmask(), area_high.simd_lt(zero).to_bitmask());
+    let front = if at.front_sign > 0.0 { positive } else { negative };
+    let facing = (front | ((positive | negative) & block.two_sided)) & block.lanes & !clip;
+
+    let x = [0, 1, 2].map(|k| to_i32(simd, low.snapped_x[k], high.snapped_x[k]));
+    let y = [0, 1, 2].map(|k| to_i32(simd, low.snapped_y[k], high.snapped_y[k]));
+    // First pixel whose centre 256·p + 128 is not left of the box, last one not right of it.
+    let first = |v: [i32x16<S>; 3]| (v[0].min(v[1]).min(v[2]) + 127) >> 8;
+    let last = |v: [i32x16<S>; 3]| (v[0].max(v[1]).max(v[2]) - 128) >> 8;
+    let left = first(x).max(i32x16::splat(simd, window.left));
+    let top = first(y).max(i32x16::splat(simd, window.top));
+    let right = last(x).min(i32x16::splat(simd, window.right - 1));
+    let bottom = last(y).min(i32x16::splat(simd, window.bottom - 1));
+    let holds_a_centre = (left.simd_le(right) & top.simd_le(bottom)).to_bitmask() as u16;
+    let draw = facing & holds_a_centre;
+
+    let mut lanes = Lanes {
+        x: [Sixteen([0; 16]); 3],
+        y: [Sixteen([0; 16]); 3],
+        left: store(left),
+        top: store(top),
+        right: store(right),
+        bottom: store(bottom),
+        plane: [[Half([0.0; 8]); 2]; 3],
+        depth_min: Sixteen([0.0; 16]),
+        depth_max: Sixteen([0.0; 16]),
+        draw,
+        clip,
+        front_facing: facing,
+    };
+    if draw == 0 {
+        return lanes;
+    }
+
+    // Corners 1 and 2 change places where that makes the area positive.
+    let swap = mask32x16::from_bitmask(simd, u64::from(negative));
+    lanes.x = [store(x[0]), store(swap.select(x[2], x[1])), store(swap.select(x[1], x[2]))];
+    lanes.y = [store(y[0]), store(swap.select(y[2], y[1])), store(swap.select(y[1], y[2]))];
+    let planes = [depth_plane(simd, &low), depth_plane(simd, &high)];
+    for (i, plane) in lanes.plane.iter_mut().enumerate() {
+        for half in 0..2 {
+            planes[half][i].store_slice(&mut plane[half].0);
+        }
+    }
+    let d = [0, 1, 2].map(|k| narrow(simd, low.d[k], high.d[k]));
+    d[0].min(d[1]).min(d[2]).store_slice(&mut lanes.depth_min.0);
+    d[0].max(d[1]).max(d[2]).store_slice(&mut lanes.depth_max.0);
+    lanes
+}
+
+#[inline(always)]
+fn widen_corners<S: Simd>(simd: S, block: &TriangleBlock) -> [[[f64x8<S>; 3]; 3]; 2] {
+    let zero = f64x8::splat(simd, 0.0);
+    let mut halves = [[[zero; 3]; 3]; 2];
+    for k in 0..3 {
+        for axis in 0..3 {
+            let (low, high) = simd.widen_f32x16(f32x16::from_slice(simd, &block.corner[k][axis]));
+            halves[0][k][axis] = low;
+            halves[1][k][axis] = high;
+        }
+    }
+    halves
+}
+
+#[inline(always)]
+fn project<S: Simd>(simd: S, corners: &[[f64x8<S>; 3]; 3], at: &ScreenFromObject) -> Eight<S> {
+    let splat = |v: f64| f64x8::splat(simd, v);
+    let dot = |row: &[f64; 4], p: &[f64x8<S>; 3]| {
+        ((splat(row[0]) * p[0] + splat(row[1]) * p[1]) + splat(row[2]) * p[2]) + splat(row[3])
+    };
+    let zero = splat(0.0);
+    let (mut x, mut y, mut d) = ([zero; 3], [zero; 3], [zero; 3]);
+    let (mut snapped_x, mut snapped_y) = ([zero; 3], [zero; 3]);
+    let mut inside = 0xFFu64;
+    let (guard_min, guard_max) = (splat(GUARD_MIN * 256.0), splat(GUARD_MAX * 256.0));
+    for k in 0..3 {
+        (x[k], y[k]) = (dot(&at.x, &corners[k]), dot(&at.y, &corners[k]));
+        if at.perspective {
+            let w = dot(&at.w, &corners[k]);
+            let reciprocal = splat(1.0) / w;
+            x[k] *= reciprocal;
+            y[k] *= reciprocal;
+            d[k] = splat(at.d[3]) * reciprocal;
+            // D ≤ W, and W > 0: behind the eye the quotient would be negative.
+            inside &= (splat(at.d[3]).simd_le(w)).to_bitmask();
+        } else {
+            d[k] = dot(&at.d, &corners[k]);
+            inside &= d[k].simd_le(splat(1.0)).to_bitmask();
+        }
+        inside &= (x[k].simd_ge(guard_min) & x[k].simd_le(guard_max)).to_bitmask();
+        inside &= (y[k].simd_ge(guard_min) & y[k].simd_le(guard_max)).to_bitmask();
+        snapped_x[k] = x[k] + splat(ROUND) - splat(ROUND);
+        snapped_y[k] = y[k] + splat(ROUND) - splat(ROUND);
+    }
+    Eight { x, y, d, snapped_x, snapped_y, clip: !inside as u16 & 0xFF }
+}
+
+/// Depth as a plane over image pixel centres, from the unsnapped corners.
+#[inline(always)]
+fn depth_plane<S: Simd>(simd: S, e: &Eight<S>) -> [f64x8<S>; 3] {
+    let splat = |v: f64| f64x8::splat(simd, v);
+    let (x1, y1, d1) = (e.x[1] - e.x[0], e.y[1] - e.y[0], e.d[1] - e.d[0]);
+    let (x2, y2, d2) = (e.x[2] - e.x[0], e.y[2] - e.y[0], e.d[2] - e.d[0]);
+    let per_pixel = splat(256.0) / (x1 * y2 - x2 * y1);
+    let sane = |slope: f64x8<S>| {
+        let bound = splat(MAX_SLOPE);
+        // False for NaN too: a triangle seen exactly edge-on gets a flat plane and is clamped anyway.
+        slope.abs().simd_le(bound).select(slope, splat(0.0))
+    };
+    let a = sane((d1 * y2 - d2 * y1) * per_pixel);
+    let b = sane((d2 * x1 - d1 * x2) * per_pixel);
+    let to_pixel = splat(1.0 / 256.0);
+    let half = splat(0.5);
+    // At pixel (0, 0)'s centre: from corner 0, back by its distance to that centre.
+    let c = e.d[0] - a * (e.x[0] * to_pixel - half) - b * (e.y[0] * to_pixel - half);
+    [a, b, c]
+}
+
+#[inline(always)]
+fn to_i32<S: Simd>(simd: S, low: f64x8<S>, high: f64x8<S>) -> i32x16<S> {
+    let round = f64x8::splat(simd, ROUND);
+    simd.narrow_i64x8((low + round).bitcast(), (high + round).bitcast())
+}
+
+#[inline(always)]
+fn narrow<S: Simd>(simd: S, low: f64x8<S>, high: f64x8<S>) -> f32x16<S> {
+    simd.narrow_f64x8(low, high)
+}
+
+#[inline(always)]
+fn sixteen_bits(low: u64, high: u64) -> u16 {
+    low as u16 | (high as u16) << 8
+}
+
+#[inline(always)]
+fn store<S: Simd>(v: i32x16<S>) -> Sixteen<i32> {
+    let mut out = Sixteen([0; 16]);
+    v.store_slice(&mut out.0);
+    out
+}
