@@ -1,6 +1,21 @@
-//! Scenes made searchable: a tree for each mesh, a tree of instances for each group, nested as the scene is.
+//! Scenes made searchable: a tree for each mesh, trees of instances for each group, nested as the scene is
+//! ("an octree of octrees", [Greene 1995, §3.5.2]).
+//!
+//! Every tree, whichever way it was built, is the same flat array of 16-wide nodes, so that one
+//! nearest-first walk serves them all.
 
-use crate::scene::{Scene, Transform};
+mod bvh;
+mod group;
+mod mesh;
+mod octree;
+mod tree;
+
+pub(crate) use group::GroupIndex;
+pub(crate) use mesh::{BlockTree, MeshIndex};
+pub(crate) use tree::{Box3, Child, Slot, WideTree};
+
+use crate::scene::{Content, Scene, Transform};
+use rayon::prelude::*;
 
 /// How a scene is indexed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,12 +40,37 @@ pub enum TreeKind {
 #[derive(Debug)]
 pub struct SceneIndex {
     scene: Scene,
+    options: IndexOptions,
+    pub(crate) meshes: Vec<MeshIndex>,
+    pub(crate) groups: Vec<GroupIndex>,
+    /// Raised by every move, so that a renderer knows whether last frame's transforms still hold.
+    pub(crate) epoch: u64,
 }
 
 impl SceneIndex {
-    /// Builds the trees. The scene must be valid ([`Scene::validate`]).
-    pub fn build(scene: Scene, _options: &IndexOptions) -> SceneIndex {
-        SceneIndex { scene }
+    /// Builds the trees. The scene must be valid ([`Scene::validate`]). Cost: n log n in stored triangles.
+    pub fn build(scene: Scene, options: &IndexOptions) -> SceneIndex {
+        let meshes: Vec<MeshIndex> = scene
+            .meshes
+            .par_iter()
+            .map(|mesh| MeshIndex::build(mesh, &scene.materials, options))
+            .collect();
+        let counts = scene.instance_counts();
+        let mut groups: Vec<GroupIndex> = Vec::with_capacity(scene.groups.len());
+        for group in &scene.groups {
+            let bounds = |c: Content| content_bounds(&meshes, &groups, c);
+            let index = GroupIndex::build(group, bounds, |c| match c {
+                Content::Mesh(_) => 1,
+                Content::Group(g) => counts[g as usize],
+                Content::Nothing => 0,
+            });
+            groups.push(index);
+        }
+        let index = SceneIndex { scene, options: *options, meshes, groups, epoch: 0 };
+        if cfg!(debug_assertions) {
+            index.validate();
+        }
+        index
     }
 
     /// The scene as it is posed now.
@@ -38,17 +78,39 @@ impl SceneIndex {
         &self.scene
     }
 
-    /// Poses the scene at `time` seconds of animation `animation` and refits what moved; static parts are
-    /// untouched. Returns the number of root-group nodes whose instances moved.
-    pub fn pose(&mut self, animation: usize, time: f64) -> usize {
-        self.scene.pose(animation, time);
-        0
+    /// How it was built.
+    pub fn options(&self) -> &IndexOptions {
+        &self.options
     }
 
-    /// Moves one node of the root group.
-    pub fn set_transform(&mut self, node: u32, local: Transform) {
+    /// Poses the scene at `time` seconds of animation `animation` and refits what moved; static parts are
+    /// untouched. Returns the number of root-group nodes with content that moved. Cost: the root group's
+    /// nodes, plus the boxes above those that moved.
+    pub fn pose(&mut self, animation: usize, time: f64) -> usize {
+        self.scene.pose(animation, time);
+        self.update()
+    }
+
+    /// Moves one node of the root group; returns how many nodes with content moved with it.
+    pub fn set_transform(&mut self, node: u32, local: Transform) -> usize {
         let root = self.scene.root as usize;
         self.scene.groups[root].nodes[node as usize].local = local;
+        self.update()
+    }
+
+    fn update(&mut self) -> usize {
+        let root = self.scene.root as usize;
+        let mut group = std::mem::take(&mut self.groups[root]);
+        let moved = group
+            .update(&self.scene.groups[root], |c| content_bounds(&self.meshes, &self.groups, c));
+        self.groups[root] = group;
+        if moved > 0 {
+            self.epoch += 1;
+            if cfg!(debug_assertions) {
+                self.validate();
+            }
+        }
+        moved
     }
 
     /// Gives the scene back.
@@ -56,8 +118,27 @@ impl SceneIndex {
         self.scene
     }
 
-    /// Bytes held by the trees and by the scene's geometry.
+    /// Bytes held by the trees and their triangles (the scene's own lists not counted).
     pub fn memory_bytes(&self) -> usize {
-        0
+        self.meshes.iter().map(MeshIndex::memory_bytes).sum::<usize>()
+            + self.groups.iter().map(GroupIndex::memory_bytes).sum::<usize>()
+    }
+
+    /// Asserts the trees' invariants: every primitive in place, every box around what it holds.
+    pub fn validate(&self) {
+        for mesh in &self.meshes {
+            mesh.validate(&self.options);
+        }
+        for group in &self.groups {
+            group.validate(|c| content_bounds(&self.meshes, &self.groups, c));
+        }
+    }
+}
+
+fn content_bounds(meshes: &[MeshIndex], groups: &[GroupIndex], content: Content) -> Box3 {
+    match content {
+        Content::Mesh(m) => meshes[m as usize].bounds(),
+        Content::Group(g) => groups[g as usize].bounds(),
+        Content::Nothing => Box3::EMPTY,
     }
 }

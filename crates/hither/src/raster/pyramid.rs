@@ -67,7 +67,6 @@ pub struct Target {
     /// What was done since the last [`Target::clear`].
     pub counters: TargetCounters,
     pub(super) tiles_x: usize,
-    tiles_y: usize,
     pub(super) depth: Vec<Sixteen<f32>>,
     pub(super) id: Vec<Sixteen<u32>>,
     touched: Vec<bool>,
@@ -106,7 +105,7 @@ impl Target {
             height: height as i32,
             counters: TargetCounters::default(),
             tiles_x,
-            tiles_y,
+
             depth: vec![Sixteen([0.0; 16]); blocks],
             id: vec![Sixteen([0; 16]); blocks],
             touched: vec![false; tiles_x * tiles_y],

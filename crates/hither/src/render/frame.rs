@@ -1,9 +1,10 @@
 //! The product of a rendering: at every pixel centre the nearest opaque or masked surface, and its depth.
 
-use crate::conventions::{NO_ID, SurfaceId, View};
+use crate::conventions::{SurfaceId, View};
+use crate::raster::Target;
 
 /// Ids and depth of the visible surface at every pixel centre.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Frame {
     /// What was asked for.
     pub view: View,
@@ -11,8 +12,9 @@ pub struct Frame {
     pub counters: Counters,
     /// Where it was done, if asked for.
     pub complexity: Option<Complexity>,
-    pub(super) depth: Vec<f32>,
-    pub(super) ids: Vec<SurfaceId>,
+    pub(super) windows: Vec<Target>,
+    /// Image column at which each window begins.
+    pub(super) columns: Vec<u32>,
 }
 
 /// What a rendering did, in the terms of [Greene 1995, §3.5.2–3.5.3].
@@ -47,27 +49,16 @@ pub struct Complexity {
 }
 
 impl Frame {
-    pub(super) fn empty(view: View) -> Frame {
-        let pixels = view.width as usize * view.height as usize;
-        let nothing = SurfaceId { instance: NO_ID, triangle: NO_ID };
-        Frame {
-            view,
-            counters: Counters::default(),
-            complexity: None,
-            depth: vec![0.0; pixels],
-            ids: vec![nothing; pixels],
-        }
-    }
-
     /// The surface at pixel (x, y), if there is one.
     pub fn id(&self, x: u32, y: u32) -> Option<SurfaceId> {
-        let id = self.ids[self.at(x, y)];
-        (id.instance != NO_ID).then_some(id)
+        let (window, x) = self.window(x, y);
+        window.surface_at(x, y)
     }
 
     /// Depth at pixel (x, y) as `conventions` defines it; 0 where there is nothing.
     pub fn depth(&self, x: u32, y: u32) -> f32 {
-        self.depth[self.at(x, y)]
+        let (window, x) = self.window(x, y);
+        window.depth_at(x, y)
     }
 
     /// Distance along the view axis at pixel (x, y), metres; +∞ where there is nothing.
@@ -75,8 +66,41 @@ impl Frame {
         self.view.projection.distance(self.depth(x, y))
     }
 
-    fn at(&self, x: u32, y: u32) -> usize {
+    /// Collects the windows' visit counts into one picture.
+    pub(super) fn gather_complexity(&mut self) {
+        let pixels = self.view.width as usize * self.view.height as usize;
+        let mut all = Complexity { cubes: vec![0.0; pixels], polygons: vec![0.0; pixels] };
+        for window in &mut self.windows {
+            let Some(visits) = window.visits.take() else { continue };
+            let width = window.width as usize;
+            for y in 0..window.height as usize {
+                let from = y * width..(y + 1) * width;
+                let at = y * self.view.width as usize + window.left as usize;
+                all.cubes[at..at + width].copy_from_slice(&visits.cubes[from.clone()]);
+                all.polygons[at..at + width].copy_from_slice(&visits.polygons[from]);
+            }
+        }
+        let sum: f64 = all.cubes.iter().chain(&all.polygons).map(|&v| f64::from(v)).sum();
+        self.counters.depth_complexity = sum / pixels as f64;
+        self.complexity = Some(all);
+    }
+
+    fn window(&self, x: u32, y: u32) -> (&Target, u32) {
         assert!(x < self.view.width && y < self.view.height, "pixel ({x}, {y}) is outside the frame");
-        y as usize * self.view.width as usize + x as usize
+        let at = self.columns.partition_point(|&c| c <= x) - 1;
+        (&self.windows[at], x - self.columns[at])
+    }
+}
+
+impl std::ops::AddAssign for Counters {
+    /// Adds counts; the depth complexity is set from the whole frame, not summed.
+    fn add_assign(&mut self, o: Counters) {
+        self.nodes_visited += o.nodes_visited;
+        self.nodes_outside += o.nodes_outside;
+        self.nodes_culled += o.nodes_culled;
+        self.triangles_tested += o.triangles_tested;
+        self.triangles_front_facing += o.triangles_front_facing;
+        self.triangles_drawn += o.triangles_drawn;
+        self.pixels_written += o.pixels_written;
     }
 }

@@ -3,6 +3,7 @@
 mod blend;
 mod frame;
 mod shade;
+mod walk;
 
 pub use blend::{BlendedTriangles, Fragment};
 pub use frame::{Complexity, Counters, Frame};
@@ -12,6 +13,8 @@ pub use shade::{
 
 use crate::conventions::{View, ViewError};
 use crate::index::SceneIndex;
+use crate::raster::{TILE, Target};
+use fearless_simd::Level;
 
 /// How visibility is found. The pictures are the same to the last bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,7 +27,7 @@ pub enum Algorithm {
 }
 
 /// What may be chosen about a rendering.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub struct RenderOptions {
     /// How visibility is found.
     pub algorithm: Algorithm,
@@ -34,17 +37,30 @@ pub struct RenderOptions {
     pub coherence: bool,
     /// Also record where the work was done ([`Complexity`]); slower.
     pub complexity: bool,
+    /// Width of the windows the image is cut into, pixels, a multiple of 16; 0 chooses it from `threads`.
+    pub window_width: u32,
+    /// Instruction set; the best that the machine has by default.
+    pub level: Level,
 }
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        RenderOptions { algorithm: Algorithm::Hzb, threads: 1, coherence: false, complexity: false }
+        RenderOptions {
+            algorithm: Algorithm::Hzb,
+            threads: 1,
+            coherence: false,
+            complexity: false,
+            window_width: 0,
+            level: Level::new(),
+        }
     }
 }
 
 /// Draws frames and keeps what is worth keeping between them: buffers, and what was visible last.
 #[derive(Debug, Default)]
-pub struct Renderer {}
+pub struct Renderer {
+    spare: Vec<Target>,
+}
 
 impl Renderer {
     /// A renderer that remembers nothing yet.
@@ -52,19 +68,106 @@ impl Renderer {
         Renderer::default()
     }
 
-    /// Draws one frame.
+    /// Draws one frame. Give it back with [`Renderer::recycle`] to save the next one its allocations.
     pub fn render(
         &mut self,
-        _index: &SceneIndex,
+        index: &SceneIndex,
         view: &View,
-        _options: &RenderOptions,
+        options: &RenderOptions,
     ) -> Result<Frame, ViewError> {
         view.validate()?;
-        Ok(Frame::empty(*view))
+        let threads = match options.threads {
+            0 => std::thread::available_parallelism().map_or(1, usize::from),
+            n => n,
+        };
+        let columns = window_columns(view, threads, options.window_width);
+        let mut windows = self.take_windows(view, &columns);
+        for window in &mut windows {
+            window.record_visits(options.complexity);
+        }
+        let draw = |w: &mut Target| walk::draw_window(options.level, index, view, options.algorithm, w);
+        let counts: Vec<Counters> = if threads == 1 || windows.len() == 1 {
+            windows.iter_mut().map(draw).collect()
+        } else {
+            in_parallel(threads, &mut windows, draw)
+        };
+        let mut counters = Counters::default();
+        for c in counts {
+            counters += c;
+        }
+        let mut frame = Frame { view: *view, counters, complexity: None, windows, columns };
+        if options.complexity {
+            frame.gather_complexity();
+        }
+        Ok(frame)
+    }
+
+    /// Takes a frame's buffers back for the next one.
+    pub fn recycle(&mut self, frame: Frame) {
+        self.spare = frame.windows;
+    }
+
+    fn take_windows(&mut self, view: &View, columns: &[u32]) -> Vec<Target> {
+        let ends = columns.iter().skip(1).copied().chain([view.width]);
+        let wanted = || columns.iter().zip(ends.clone()).map(|(&from, to)| (from, to - from));
+        let spare = std::mem::take(&mut self.spare);
+        let fits = spare.len() == columns.len()
+            && wanted().zip(&spare).all(|((left, width), t)| {
+                t.left == left as i32 && t.width == width as i32 && t.height == view.height as i32
+            });
+        if fits {
+            let mut windows = spare;
+            windows.iter_mut().for_each(Target::clear);
+            return windows;
+        }
+        drop(spare);
+        wanted().map(|(left, width)| Target::new(left, 0, width, view.height)).collect()
     }
 }
 
 /// Draws one frame from scratch.
 pub fn render(index: &SceneIndex, view: &View, options: &RenderOptions) -> Result<Frame, ViewError> {
     Renderer::new().render(index, view, options)
+}
+
+/// Where the image is cut into upright windows [Greene 1995, §3.5.5].
+fn window_columns(view: &View, threads: usize, window_width: u32) -> Vec<u32> {
+    let width = if window_width > 0 {
+        window_width.next_multiple_of(TILE)
+    } else if threads == 1 {
+        view.width
+    } else {
+        view.width.div_ceil(threads as u32 * WINDOWS_A_THREAD).next_multiple_of(64)
+    };
+    (0..view.width).step_by(width as usize).collect()
+}
+
+/// More windows balance the load, but each walks the tree anew.
+const WINDOWS_A_THREAD: u32 = 2;
+
+/// Workers take the next window until none is left.
+fn in_parallel(
+    threads: usize,
+    windows: &mut [Target],
+    draw: impl Fn(&mut Target) -> Counters + Sync,
+) -> Vec<Counters> {
+    let queue = std::sync::Mutex::new(windows.iter_mut());
+    let work = || {
+        let mut total = Counters::default();
+        loop {
+            let next = queue.lock().expect("no worker panics while it holds the lock").next();
+            match next {
+                Some(window) => total += draw(window),
+                None => return total,
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
+        let mut counts = vec![work()];
+        for other in others {
+            counts.push(other.join().expect("a window was not drawn"));
+        }
+        counts
+    })
 }

@@ -1,0 +1,270 @@
+//! The nearest-first walk of a scene's nested trees, drawing as it goes [Greene 1995, §3.3.1].
+//!
+//! ```text
+//! push the root
+//! while something is open:
+//!     take the nearest open entry; if the z-pyramid hides its rectangle at its nearest depth: drop it
+//!     a block of triangles: draw it
+//!     an instance: enter its tree, with its transform composed in f64
+//!     a node: project its sixteen boxes; push those that may hold a pixel centre, farthest first
+//! ```
+//!
+//! The order only saves work: whatever it is, the window ends up the same (see `raster`). Entries are
+//! tested when they are taken, not when they are pushed, so that what was drawn meanwhile counts.
+//!
+//! The plain z-buffer is the same walk with every test against the pyramid left out: it visits all that
+//! lies in the frustum and draws all of it.
+
+use super::{Algorithm, Counters};
+use crate::conventions::View;
+use crate::index::{BlockTree, Child, GroupIndex, SceneIndex, Slot, WideTree};
+use crate::raster::{BoxSet, Drawing, ProjectedBoxes, Rect, ScreenFromObject, Target, draw_block, project_boxes};
+use crate::scene::{Content, Scene};
+use fearless_simd::{Level, Simd, dispatch};
+use glam::DVec3;
+
+/// Draws what `index` shows of `view` into one window.
+pub(super) fn draw_window(
+    level: Level,
+    index: &SceneIndex,
+    view: &View,
+    algorithm: Algorithm,
+    target: &mut Target,
+) -> Counters {
+    dispatch!(level, simd => walk(simd, index, view, algorithm, target))
+}
+
+/// A tree entered with a transform.
+struct Context<'a> {
+    space: Space<'a>,
+    at: ScreenFromObject,
+    boxes: BoxSet,
+    /// Number of the instance (or of a group's first).
+    instance: u32,
+}
+
+#[derive(Clone, Copy)]
+enum Space<'a> {
+    Mesh { blocks: &'a BlockTree, mesh: u32 },
+    Group(&'a GroupIndex),
+}
+
+/// Something to be visited: a child of a node, where it lies, and how near it comes.
+#[derive(Clone, Copy)]
+struct Entry {
+    slot: Slot,
+    /// Index of its context, and whether the slot belongs to a group's tree of moving items.
+    context: u32,
+    moving: bool,
+    rect: [u16; 4],
+    depth: f32,
+}
+
+struct Walk<'a> {
+    index: &'a SceneIndex,
+    contexts: Vec<Context<'a>>,
+    open: Vec<Entry>,
+    window: Rect,
+    hierarchical: bool,
+    counters: Counters,
+}
+
+#[inline(always)]
+fn walk<S: Simd>(
+    simd: S,
+    index: &SceneIndex,
+    view: &View,
+    algorithm: Algorithm,
+    target: &mut Target,
+) -> Counters {
+    let window = Rect {
+        left: target.left,
+        top: target.top,
+        right: target.left + target.width,
+        bottom: target.top + target.height,
+    };
+    let mut walk = Walk {
+        index,
+        contexts: Vec::with_capacity(16),
+        open: Vec::with_capacity(256),
+        window,
+        hierarchical: algorithm == Algorithm::Hzb,
+        counters: Counters::default(),
+    };
+    let root = index.scene().root;
+    walk.enter(simd, Content::Group(root), ScreenFromObject::of_view(view), 0);
+    while let Some(entry) = walk.open.pop() {
+        if walk.hierarchical && target.hides(simd, rect_of(&entry), entry.depth) {
+            walk.counters.nodes_culled += 1;
+            continue;
+        }
+        // Everything entered after this entry's tree is done with.
+        walk.contexts.truncate(entry.context as usize + 1);
+        match entry.slot.child() {
+            Child::Node(node) => walk.visit_node(simd, entry.context, entry.moving, node),
+            Child::Leaf(leaf) => walk.visit_leaf(simd, target, entry.context, leaf),
+        }
+    }
+    walk.counters.pixels_written = target.counters.pixels_written;
+    walk.counters
+}
+
+fn rect_of(entry: &Entry) -> Rect {
+    let [left, top, right, bottom] = entry.rect.map(i32::from);
+    Rect { left, top, right: right + 1, bottom: bottom + 1 }
+}
+
+impl<'a> Walk<'a> {
+    /// Opens the tree of `content` (seen through `at`) and visits its root.
+    #[inline(always)]
+    fn enter<S: Simd>(&mut self, simd: S, content: Content, at: ScreenFromObject, instance: u32) {
+        let (space, bounds) = match content {
+            Content::Mesh(mesh) => {
+                let blocks = &self.index.meshes[mesh as usize].solid;
+                (Space::Mesh { blocks, mesh }, blocks.tree.bounds())
+            }
+            Content::Group(g) => {
+                let group = &self.index.groups[g as usize];
+                (Space::Group(group), group.bounds())
+            }
+            Content::Nothing => return,
+        };
+        if bounds.is_empty() {
+            return;
+        }
+        let context = self.contexts.len() as u32;
+        self.contexts.push(Context { space, at, boxes: BoxSet::new(&at, bounds.reach()), instance });
+        match space {
+            Space::Mesh { .. } => self.visit_node(simd, context, false, 0),
+            Space::Group(group) => {
+                for (tree, moving) in [(&group.resting, false), (&group.moving, true)] {
+                    if !tree.nodes.is_empty() {
+                        self.visit_node(simd, context, moving, 0);
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn visit_node<S: Simd>(&mut self, simd: S, context: u32, moving: bool, node: u32) {
+        let c = &self.contexts[context as usize];
+        let tree: &WideTree = match c.space {
+            Space::Mesh { blocks, .. } => &blocks.tree,
+            Space::Group(group) if moving => &group.moving,
+            Space::Group(group) => &group.resting,
+        };
+        let node = &tree.nodes[node as usize];
+        let window = self.window;
+        let boxes = &c.boxes;
+        let projected = simd.vectorize(
+            #[inline(always)]
+            || project_boxes(simd, boxes, &node.min, &node.max, window),
+        );
+        let alive = projected.alive & (0xFFFFu32 >> (16 - node.used)) as u16;
+        self.counters.nodes_visited += u64::from(node.used);
+        self.counters.nodes_outside += u64::from(node.used - alive.count_ones());
+        self.push_children(&projected, alive, &node.child, context, moving);
+    }
+
+    /// Pushes the children in `alive`, farthest first.
+    #[inline(always)]
+    fn push_children(
+        &mut self,
+        projected: &ProjectedBoxes,
+        alive: u16,
+        child: &[Slot; 16],
+        context: u32,
+        moving: bool,
+    ) {
+        // Depths are not negative, so their bits sort as they do; the lane rides along.
+        let mut order = [0u64; 16];
+        let mut count = 0;
+        let mut rest = alive;
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            if child[lane] == Slot::EMPTY {
+                continue;
+            }
+            let key = u64::from(projected.depth[lane].max(0.0).to_bits()) << 8 | lane as u64;
+            let mut at = count;
+            while at > 0 && order[at - 1] > key {
+                order[at] = order[at - 1];
+                at -= 1;
+            }
+            order[at] = key;
+            count += 1;
+        }
+        for key in &order[..count] {
+            let lane = (key & 0xFF) as usize;
+            let edge = |side: &[f32; 16]| side[lane] as u16;
+            self.open.push(Entry {
+                slot: child[lane],
+                context,
+                moving,
+                rect: [
+                    edge(&projected.left),
+                    edge(&projected.top),
+                    edge(&projected.right),
+                    edge(&projected.bottom),
+                ],
+                depth: projected.depth[lane],
+            });
+        }
+    }
+
+    #[inline(always)]
+    fn visit_leaf<S: Simd>(&mut self, simd: S, target: &mut Target, context: u32, leaf: u32) {
+        let c = &self.contexts[context as usize];
+        match c.space {
+            Space::Group(group) => {
+                let item = &group.items[leaf as usize];
+                let (at, instance) = (c.at.after(&item.group_from_content), c.instance + item.first_instance);
+                self.enter(simd, item.content, at, instance);
+            }
+            Space::Mesh { blocks, mesh } => {
+                let block = &blocks.blocks[leaf as usize];
+                let scene = self.index.scene();
+                let mut is_hole =
+                    |lane: usize, x, y| is_hole(scene, mesh, block.triangle[lane], &block.corners(lane), &c.at, x, y);
+                let drawing = Drawing { instance: c.instance, at: &c.at, hierarchical: self.hierarchical };
+                let counts = simd.vectorize(
+                    #[inline(always)]
+                    || draw_block(simd, target, block, &drawing, &mut is_hole),
+                );
+                self.counters.triangles_tested += u64::from(block.lanes.count_ones());
+                self.counters.triangles_front_facing += u64::from(counts.front_facing);
+                self.counters.triangles_drawn += u64::from(counts.drawn);
+            }
+        }
+    }
+}
+
+/// Whether a masked triangle has a hole at an image pixel's centre.
+#[inline(never)]
+fn is_hole(
+    scene: &Scene,
+    mesh: u32,
+    triangle: u32,
+    corners: &[[f32; 3]; 3],
+    at: &ScreenFromObject,
+    x: i32,
+    y: i32,
+) -> bool {
+    scene.is_hole(mesh, triangle, barycentric(corners, at, x, y))
+}
+
+/// Barycentric weights of the triangle's point behind an image pixel's centre, perspective included.
+pub(super) fn barycentric(corners: &[[f32; 3]; 3], at: &ScreenFromObject, x: i32, y: i32) -> DVec3 {
+    let v = corners.map(|c| at.point(c.map(f64::from))).map(|p| DVec3::new(p[0], p[1], p[2]));
+    let pixel = DVec3::new(f64::from(x * 256 + 128), f64::from(y * 256 + 128), 1.0);
+    let weights = DVec3::new(
+        pixel.dot(v[1].cross(v[2])),
+        pixel.dot(v[2].cross(v[0])),
+        pixel.dot(v[0].cross(v[1])),
+    );
+    let sum = weights.x + weights.y + weights.z;
+    weights / sum
+}
+
