@@ -104,16 +104,17 @@ fn parts_of(mut ranges: Vec<(&mut [Primitive], Box3)>, leaf_size: usize) -> Vec<
             })
             .map_or(1, |i| (i + 1).min(ranges.len() - 1));
         let right = ranges.split_off(middle);
-        let (mut left, right) =
-            rayon::join(|| parts_of(ranges, leaf_size), || parts_of(right, leaf_size));
+        let (mut left, right) = rayon::join(|| parts_of(ranges, leaf_size), || parts_of(right, leaf_size));
         left.extend(right);
         return left;
     }
     ranges
         .into_iter()
-        .map(|(range, bounds)| {
-            if range.len() <= leaf_size { leaf(range, bounds) } else { node(range, bounds, leaf_size) }
-        })
+        .map(
+            |(range, bounds)| {
+                if range.len() <= leaf_size { leaf(range, bounds) } else { node(range, bounds, leaf_size) }
+            },
+        )
         .collect()
 }
 
@@ -157,7 +158,8 @@ fn best_plane(range: &[Primitive], leaf_size: usize) -> Option<(usize, f32, f32,
         }
     }
     let scale: [f32; 3] = std::array::from_fn(|i| BINS as f32 / (high[i] - low[i]));
-    let usable: [bool; 3] = std::array::from_fn(|i| high[i] > low[i] && scale[i].is_finite() && scale[i] > 0.0);
+    let usable: [bool; 3] =
+        std::array::from_fn(|i| high[i] > low[i] && scale[i].is_finite() && scale[i] > 0.0);
     let mut bins = [[Bin { bounds: Box3::EMPTY, count: 0 }; BINS]; 3];
     for p in range.iter() {
         for axis in 0..3 {

@@ -143,8 +143,13 @@ impl GroupIndex {
                         Child::Leaf(i) => {
                             let item = &self.items[i as usize];
                             let place = self.places[i as usize];
-                            assert!(place.moves == moves && place.node as usize == n && place.slot as usize == slot);
-                            let bounds = placed_bounds(&content_bounds(item.content), &item.group_from_content);
+                            assert!(
+                                place.moves == moves
+                                    && place.node as usize == n
+                                    && place.slot as usize == slot
+                            );
+                            let bounds =
+                                placed_bounds(&content_bounds(item.content), &item.group_from_content);
                             assert!(node.bounds_of(slot).contains(&bounds), "item {i} sticks out of its box");
                         }
                         Child::Node(c) => {

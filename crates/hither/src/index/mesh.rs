@@ -108,8 +108,8 @@ fn block(mesh: &Mesh, materials: &[Material], triangles: &[u32]) -> TriangleBloc
 }
 
 fn block_bounds(block: &TriangleBlock) -> Box3 {
-    (0..16).filter(|l| block.lanes & (1 << l) != 0).flat_map(|l| block.corners(l)).fold(
-        Box3::EMPTY,
-        |b, p| b.union(&Box3 { min: p, max: p }),
-    )
+    (0..16)
+        .filter(|l| block.lanes & (1 << l) != 0)
+        .flat_map(|l| block.corners(l))
+        .fold(Box3::EMPTY, |b, p| b.union(&Box3 { min: p, max: p }))
 }

@@ -50,11 +50,8 @@ pub struct SceneIndex {
 impl SceneIndex {
     /// Builds the trees. The scene must be valid ([`Scene::validate`]). Cost: n log n in stored triangles.
     pub fn build(scene: Scene, options: &IndexOptions) -> SceneIndex {
-        let meshes: Vec<MeshIndex> = scene
-            .meshes
-            .par_iter()
-            .map(|mesh| MeshIndex::build(mesh, &scene.materials, options))
-            .collect();
+        let meshes: Vec<MeshIndex> =
+            scene.meshes.par_iter().map(|mesh| MeshIndex::build(mesh, &scene.materials, options)).collect();
         let counts = scene.instance_counts();
         let mut groups: Vec<GroupIndex> = Vec::with_capacity(scene.groups.len());
         for group in &scene.groups {
@@ -101,8 +98,7 @@ impl SceneIndex {
     fn update(&mut self) -> usize {
         let root = self.scene.root as usize;
         let mut group = std::mem::take(&mut self.groups[root]);
-        let moved = group
-            .update(&self.scene.groups[root], |c| content_bounds(&self.meshes, &self.groups, c));
+        let moved = group.update(&self.scene.groups[root], |c| content_bounds(&self.meshes, &self.groups, c));
         self.groups[root] = group;
         if moved > 0 {
             self.epoch += 1;

@@ -72,53 +72,54 @@ pub fn project_boxes<S: Simd>(
     if !set.in_range {
         return everywhere(window);
     }
-    let splat = |v: f32| f32x16::splat(simd, v);
-    let [x, y] = [&set.x, &set.y].map(|row| corners(simd, row, min, max));
+    let (x, y) = (corners(simd, &set.x, min, max), corners(simd, &set.y, min, max));
     let (lowest, depth, safe, before_near);
-    let mut low = [splat(0.0); 2];
-    let mut high = [splat(0.0); 2];
+    let mut low = [f32x16::splat(simd, 0.0); 2];
+    let mut high = [f32x16::splat(simd, 0.0); 2];
     if set.perspective {
         let w = corners(simd, &set.w, min, max);
-        lowest = w[1..].iter().fold(w[0], |m, &v| m.min(v)) - set.error[2];
-        let highest = w[1..].iter().fold(w[0], |m, &v| m.max(v)) + set.error[2];
-        let near = splat(set.d[3]);
+        lowest = smallest(&w) - set.error[2];
+        let highest = largest(&w) + set.error[2];
+        let near = f32x16::splat(simd, set.d[3]);
         // Relative error of W below 1/8, else the box counts as crossing the near plane.
-        safe = lowest.simd_gt(near.max(splat(set.error[2] * 8.0)));
+        safe = lowest.simd_gt(near.max(f32x16::splat(simd, set.error[2] * 8.0)));
         before_near = highest.simd_ge(near * 0.999_999);
         depth = near / lowest * 1.000_001;
         for c in 0..8 {
-            let reciprocal = splat(1.0) / w[c];
-            for (k, p) in [&x, &y].into_iter().enumerate() {
-                let q = p[c] * reciprocal;
-                (low[k], high[k]) = if c == 0 { (q, q) } else { (low[k].min(q), high[k].max(q)) };
+            let reciprocal = f32x16::splat(simd, 1.0) / w[c];
+            let (qx, qy) = (x[c] * reciprocal, y[c] * reciprocal);
+            if c == 0 {
+                (low, high) = ([qx, qy], [qx, qy]);
+            } else {
+                low = [low[0].min(qx), low[1].min(qy)];
+                high = [high[0].max(qx), high[1].max(qy)];
             }
         }
     } else {
         let d = corners(simd, &set.d, min, max);
-        let nearest = d[1..].iter().fold(d[0], |m, &v| m.max(v)) + set.error[3];
-        lowest = splat(1.0);
-        safe = nearest.simd_le(splat(1.0));
-        let farthest = d[1..].iter().fold(d[0], |m, &v| m.min(v)) - set.error[3];
-        before_near = farthest.simd_le(splat(1.0)) & nearest.simd_gt(splat(0.0));
+        let nearest = largest(&d) + set.error[3];
+        lowest = f32x16::splat(simd, 1.0);
+        safe = nearest.simd_le(f32x16::splat(simd, 1.0));
+        let farthest = smallest(&d) - set.error[3];
+        before_near = farthest.simd_le(f32x16::splat(simd, 1.0)) & nearest.simd_gt(f32x16::splat(simd, 0.0));
         depth = nearest;
-        for (k, p) in [&x, &y].into_iter().enumerate() {
-            low[k] = p[1..].iter().fold(p[0], |m, &v| m.min(v));
-            high[k] = p[1..].iter().fold(p[0], |m, &v| m.max(v));
-        }
+        low = [smallest(&x), smallest(&y)];
+        high = [largest(&x), largest(&y)];
     }
-    let mut edges = [splat(0.0); 4];
+    let mut edges = [f32x16::splat(simd, 0.0); 4];
     let mut meets = before_near;
     let sizes = [(window.left, window.right), (window.top, window.bottom)];
     for k in 0..2 {
         let (first, last) = (sizes[k].0 as f32, (sizes[k].1 - 1) as f32);
-        let largest = low[k].abs().max(high[k].abs());
-        let margin = (largest * set.error[2] + set.error[k]) / lowest + largest * (1.0 / (1 << 21) as f32);
+        let farthest_off = low[k].abs().max(high[k].abs());
+        let margin =
+            (farthest_off * set.error[2] + set.error[k]) / lowest + farthest_off * (1.0 / (1 << 21) as f32);
         // Pixel p's centre is p + 1/2; 1/256 covers snapping.
-        let from = (low[k] - margin - (0.5 + 1.0 / 256.0)).ceil().max(splat(first));
-        let to = (high[k] + margin - (0.5 - 1.0 / 256.0)).floor().min(splat(last));
+        let from = (low[k] - margin - (0.5 + 1.0 / 256.0)).ceil().max(f32x16::splat(simd, first));
+        let to = (high[k] + margin - (0.5 - 1.0 / 256.0)).floor().min(f32x16::splat(simd, last));
         // The whole window where the box may cross the near plane.
-        edges[k] = safe.select(from, splat(first)) - first;
-        edges[k + 2] = safe.select(to, splat(last)) - first;
+        edges[k] = safe.select(from, f32x16::splat(simd, first)) - first;
+        edges[k + 2] = safe.select(to, f32x16::splat(simd, last)) - first;
         meets &= edges[k].simd_le(edges[k + 2]);
     }
     // Boxes that cross the near plane are still tested against the window's four sides.
@@ -127,17 +128,12 @@ pub fn project_boxes<S: Simd>(
     if crossing.any_true() {
         alive &= !outside_sides(simd, set, &x, &y, min, max, window) | !(crossing.to_bitmask() as u16);
     }
-    let store = |v: f32x16<S>| {
-        let mut out = [0.0; 16];
-        v.store_slice(&mut out);
-        out
-    };
     ProjectedBoxes {
         left: store(edges[0]),
         top: store(edges[1]),
         right: store(edges[2]),
         bottom: store(edges[3]),
-        depth: store(safe.select(depth, splat(f32::INFINITY))),
+        depth: store(safe.select(depth, f32x16::splat(simd, f32::INFINITY))),
         alive,
     }
 }
@@ -166,22 +162,18 @@ fn outside_sides<S: Simd>(
     max: &[[f32; 16]; 3],
     window: Rect,
 ) -> u16 {
-    let splat = |v: f32| f32x16::splat(simd, v);
-    let w = if set.perspective { corners(simd, &set.w, min, max) } else { [splat(1.0); 8] };
+    let w = if set.perspective { corners(simd, &set.w, min, max) } else { [f32x16::splat(simd, 1.0); 8] };
     let mut outside = 0u16;
-    let sides = [
-        (x, set.error[0], window.left, window.right),
-        (y, set.error[1], window.top, window.bottom),
-    ];
+    let sides = [(x, set.error[0], window.left, window.right), (y, set.error[1], window.top, window.bottom)];
     for (p, error, first, last) in sides {
         for (bound, sign) in [(first as f32, 1.0f32), (last as f32, -1.0f32)] {
             let slack = error + bound.abs() * set.error[2];
-            let mut most = splat(f32::NEG_INFINITY);
+            let mut most = f32x16::splat(simd, f32::NEG_INFINITY);
             for c in 0..8 {
                 most = most.max((p[c] - w[c] * bound) * sign);
             }
             // Twice the bound, for the rounding of the difference itself.
-            outside |= most.simd_lt(splat(-2.0 * slack)).to_bitmask() as u16;
+            outside |= most.simd_lt(f32x16::splat(simd, -2.0 * slack)).to_bitmask() as u16;
         }
     }
     outside
@@ -190,10 +182,9 @@ fn outside_sides<S: Simd>(
 /// `row · corner` for the eight corners of sixteen boxes; bit 0 of the corner is x, bit 1 y, bit 2 z.
 #[inline(always)]
 fn corners<S: Simd>(simd: S, row: &[f32; 4], min: &[[f32; 16]; 3], max: &[[f32; 16]; 3]) -> [f32x16<S>; 8] {
-    let term = |axis: usize, from: &[[f32; 16]; 3]| f32x16::from_slice(simd, &from[axis]) * row[axis];
-    let x = [term(0, min) + row[3], term(0, max) + row[3]];
-    let y = [term(1, min), term(1, max)];
-    let z = [term(2, min), term(2, max)];
+    let x = [term(simd, row, min, 0) + row[3], term(simd, row, max, 0) + row[3]];
+    let y = [term(simd, row, min, 1), term(simd, row, max, 1)];
+    let z = [term(simd, row, min, 2), term(simd, row, max, 2)];
     let xy = [x[0] + y[0], x[1] + y[0], x[0] + y[1], x[1] + y[1]];
     [
         xy[0] + z[0],
@@ -205,4 +196,26 @@ fn corners<S: Simd>(simd: S, row: &[f32; 4], min: &[[f32; 16]; 3], max: &[[f32; 
         xy[2] + z[1],
         xy[3] + z[1],
     ]
+}
+
+#[inline(always)]
+fn term<S: Simd>(simd: S, row: &[f32; 4], from: &[[f32; 16]; 3], axis: usize) -> f32x16<S> {
+    f32x16::from_slice(simd, &from[axis]) * row[axis]
+}
+
+#[inline(always)]
+fn smallest<S: Simd>(v: &[f32x16<S>; 8]) -> f32x16<S> {
+    (v[0].min(v[1])).min(v[2].min(v[3])).min((v[4].min(v[5])).min(v[6].min(v[7])))
+}
+
+#[inline(always)]
+fn largest<S: Simd>(v: &[f32x16<S>; 8]) -> f32x16<S> {
+    (v[0].max(v[1])).max(v[2].max(v[3])).max((v[4].max(v[5])).max(v[6].max(v[7])))
+}
+
+#[inline(always)]
+fn store<S: Simd>(v: f32x16<S>) -> [f32; 16] {
+    let mut out = [0.0; 16];
+    v.store_slice(&mut out);
+    out
 }

@@ -30,18 +30,14 @@ struct Polygon {
     len: usize,
 }
 
-pub(super) fn clip(
-    corners: &[[f32; 3]; 3],
-    at: &ScreenFromObject,
-    two_sided: bool,
-    window: Rect,
-) -> Pieces {
+pub(super) fn clip(corners: &[[f32; 3]; 3], at: &ScreenFromObject, two_sided: bool, window: Rect) -> Pieces {
     let v = corners.map(|c| at.point(c.map(f64::from)));
     if v.iter().flatten().any(|c| !c.is_finite()) {
         return Pieces::NONE;
     }
     // Facing without projecting: the sign of the eye's side of the triangle's plane.
-    let volume = determinant([v[0][0], v[1][0], v[2][0]], [v[0][1], v[1][1], v[2][1]], [v[0][2], v[1][2], v[2][2]]);
+    let volume =
+        determinant([v[0][0], v[1][0], v[2][0]], [v[0][1], v[1][1], v[2][1]], [v[0][2], v[1][2], v[2][2]]);
     let front = volume * at.front_sign > 0.0;
     if volume == 0.0 || !(front || two_sided) {
         return Pieces::NONE;
@@ -105,7 +101,8 @@ fn fan(polygon: &Polygon, v: &[[f64; 4]; 3], positive: bool, window: Rect) -> Pi
         if !positive {
             std::mem::swap(&mut b, &mut c);
         }
-        let area = i64::from(b[0] - a[0]) * i64::from(c[1] - a[1]) - i64::from(c[0] - a[0]) * i64::from(b[1] - a[1]);
+        let area =
+            i64::from(b[0] - a[0]) * i64::from(c[1] - a[1]) - i64::from(c[0] - a[0]) * i64::from(b[1] - a[1]);
         let x = [a[0], b[0], c[0]];
         let y = [a[1], b[1], c[1]];
         let first = |v: [i32; 3], low: i32| ((v[0].min(v[1]).min(v[2]) + 127) >> 8).max(low);
@@ -136,5 +133,6 @@ fn homogeneous_plane(v: &[[f64; 4]; 3]) -> [f64; 3] {
 }
 
 fn determinant(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> f64 {
-    a[0] * (b[1] * c[2] - b[2] * c[1]) - b[0] * (a[1] * c[2] - a[2] * c[1]) + c[0] * (a[1] * b[2] - a[2] * b[1])
+    a[0] * (b[1] * c[2] - b[2] * c[1]) - b[0] * (a[1] * c[2] - a[2] * c[1])
+        + c[0] * (a[1] * b[2] - a[2] * b[1])
 }

@@ -174,16 +174,19 @@ impl Edge {
 
 #[inline(always)]
 fn edges(t: &ScreenTriangle, target: &Target) -> [Edge; 3] {
-    [(0, 1), (1, 2), (2, 0)].map(|(i, j)| {
-        let (dx, dy) = (t.x[j] - t.x[i], t.y[j] - t.y[i]);
-        let (a, b) = (-dy, dx);
-        // Clockwise on a y-down screen: left edges go up, top edges go right.
-        let owned = dy < 0 || (dy == 0 && dx > 0);
-        let x = i64::from(128 + 256 * target.left - t.x[i]);
-        let y = i64::from(128 + 256 * target.top - t.y[i]);
-        let e = i64::from(a) * x + i64::from(b) * y - i64::from(!owned);
-        Edge { a, b, c: e >> 8 }
-    })
+    [edge(t, target, 0, 1), edge(t, target, 1, 2), edge(t, target, 2, 0)]
+}
+
+#[inline(always)]
+fn edge(t: &ScreenTriangle, target: &Target, i: usize, j: usize) -> Edge {
+    let (dx, dy) = (t.x[j] - t.x[i], t.y[j] - t.y[i]);
+    let (a, b) = (-dy, dx);
+    // Clockwise on a y-down screen: left edges go up, top edges go right.
+    let owned = dy < 0 || (dy == 0 && dx > 0);
+    let x = i64::from(128 + 256 * target.left - t.x[i]);
+    let y = i64::from(128 + 256 * target.top - t.y[i]);
+    let e = i64::from(a) * x + i64::from(b) * y - i64::from(!owned);
+    Edge { a, b, c: e >> 8 }
 }
 
 /// A triangle while it is filled: everything that stays the same from block to block.
@@ -242,7 +245,8 @@ fn fill<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
     // A small triangle that every block it meets hides is dropped before anything else is computed.
     let mut blocks = 0u32;
     if small {
-        for (i, (bx, by)) in [(left, top), (right, top), (left, bottom), (right, bottom)].into_iter().enumerate() {
+        for i in 0..4 {
+            let (bx, by) = (if i & 1 == 0 { left } else { right }, if i & 2 == 0 { top } else { bottom });
             let repeated = (i & 1 != 0 && right == left) || (i & 2 != 0 && bottom == top);
             if !repeated {
                 let tile = (by >> 2) as usize * target.tiles_x + (bx >> 2) as usize;
@@ -263,14 +267,17 @@ fn fill<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
     let edges = edges(t, target);
     let column = i32x16::from_slice(simd, &COLUMN);
     let row = i32x16::from_slice(simd, &ROW);
-    let splat = |v: f32| f32x16::splat(simd, v);
     let mut filling = Filling {
         edges,
-        edge_steps: edges.map(|e| column * e.a + row * e.b),
-        depth_steps: splat(t.plane[0] as f32) * f32x16::from_slice(simd, &COLUMN_F)
-            + splat(t.plane[1] as f32) * f32x16::from_slice(simd, &ROW_F),
-        depth_min: splat(t.depth_min),
-        depth_max: splat(t.depth_max),
+        edge_steps: [
+            column * edges[0].a + row * edges[0].b,
+            column * edges[1].a + row * edges[1].b,
+            column * edges[2].a + row * edges[2].b,
+        ],
+        depth_steps: f32x16::from_slice(simd, &COLUMN_F) * t.plane[0] as f32
+            + f32x16::from_slice(simd, &ROW_F) * t.plane[1] as f32,
+        depth_min: f32x16::splat(simd, t.depth_min),
+        depth_max: f32x16::splat(simd, t.depth_max),
         plane: t.plane,
         slot: target.surfaces.len() as u32,
         id,
@@ -296,8 +303,8 @@ fn fill<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
                         (right - cell_x * 4).min(3),
                         (bottom - cell_y * 4).min(3),
                     );
-                    let mut tiles =
-                        within & tiles_of_cell::<S, HIERARCHICAL>(simd, target, f, t.depth_max, cell_x, cell_y);
+                    let mut tiles = within
+                        & tiles_of_cell::<S, HIERARCHICAL>(simd, target, f, t.depth_max, cell_x, cell_y);
                     while tiles != 0 {
                         let c = tiles.trailing_zeros() as i32;
                         tiles &= tiles - 1;
@@ -338,7 +345,8 @@ fn tiles_of_cell<S: Simd, const HIERARCHICAL: bool>(
 ) -> u32 {
     // A cell's steps need 30 bits, so edges are taken 1/16 as fine: sums of floors are at most 1 short.
     let mut outside = i32x16::splat(simd, 0);
-    for (edge, steps) in f.edges.iter().zip(f.edge_steps) {
+    for k in 0..3 {
+        let (edge, steps) = (&f.edges[k], f.edge_steps[k]);
         let origin = ((edge.at(cell_x * 64, cell_y * 64) >> 4) + (i64::from(edge.reach_up(15)) >> 4) + 2)
             .clamp(-(1 << 30), (1 << 30) - 1) as i32;
         outside |= steps + origin;
@@ -373,7 +381,8 @@ fn fill_tile<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
     let (x, y) = (tile_x * 16, tile_y * 16);
     let mut outside = i32x16::splat(simd, 0);
     let mut partial = i32x16::splat(simd, 0);
-    for (edge, steps) in f.edges.iter().zip(f.edge_steps) {
+    for k in 0..3 {
+        let (edge, steps) = (&f.edges[k], f.edge_steps[k]);
         let at_blocks = (steps << 2) + edge.at_saturated(x, y);
         outside |= at_blocks + edge.reach_up(3);
         partial |= at_blocks + edge.reach_down(3);
@@ -416,8 +425,8 @@ fn fill_block<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
         0xFFFF
     } else {
         let mut outside = i32x16::splat(simd, 0);
-        for (edge, steps) in f.edges.iter().zip(f.edge_steps) {
-            outside |= steps + edge.at_saturated(x, y);
+        for k in 0..3 {
+            outside |= f.edge_steps[k] + f.edges[k].at_saturated(x, y);
         }
         !(outside.simd_lt(i32x16::splat(simd, 0)).to_bitmask() as u32) & 0xFFFF
     };

@@ -79,7 +79,10 @@ pub struct Target {
 impl Target {
     /// A window with its top left corner at image pixel (`left`, `top`), cleared.
     pub fn new(left: u32, top: u32, width: u32, height: u32) -> Target {
-        assert!(left.is_multiple_of(super::TILE) && top.is_multiple_of(super::TILE), "windows start on tiles");
+        assert!(
+            left.is_multiple_of(super::TILE) && top.is_multiple_of(super::TILE),
+            "windows start on tiles"
+        );
         assert!(width > 0 && height > 0, "a window has pixels");
         let (tiles_x, tiles_y) = (width.div_ceil(16) as usize, height.div_ceil(16) as usize);
         let blocks = tiles_x * tiles_y * 16;
@@ -308,7 +311,12 @@ impl Target {
 
     /// Minima of sixteen tiles of a 64-pixel cell; `None` where the pyramid ends below.
     #[inline(always)]
-    pub(super) fn tile_minima<S: Simd>(&mut self, simd: S, cell_x: usize, cell_y: usize) -> Option<&[f32; 16]> {
+    pub(super) fn tile_minima<S: Simd>(
+        &mut self,
+        simd: S,
+        cell_x: usize,
+        cell_y: usize,
+    ) -> Option<&[f32; 16]> {
         if self.levels.len() < 2 {
             return None;
         }
@@ -374,8 +382,7 @@ impl Target {
     /// Starts or stops counting visits a pixel.
     pub(crate) fn record_visits(&mut self, on: bool) {
         let pixels = (self.width * self.height) as usize;
-        self.visits =
-            on.then(|| Box::new(Visits { cubes: vec![0.0; pixels], polygons: vec![0.0; pixels] }));
+        self.visits = on.then(|| Box::new(Visits { cubes: vec![0.0; pixels], polygons: vec![0.0; pixels] }));
     }
 
     #[inline(always)]

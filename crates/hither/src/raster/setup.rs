@@ -33,13 +33,8 @@ pub struct TriangleBlock {
 
 impl TriangleBlock {
     /// A block without triangles.
-    pub const EMPTY: TriangleBlock = TriangleBlock {
-        corner: [[[0.0; 16]; 3]; 3],
-        triangle: [0; 16],
-        lanes: 0,
-        two_sided: 0,
-        masked: 0,
-    };
+    pub const EMPTY: TriangleBlock =
+        TriangleBlock { corner: [[[0.0; 16]; 3]; 3], triangle: [0; 16], lanes: 0, two_sided: 0, masked: 0 };
 
     /// Corners of one lane.
     pub fn corners(&self, lane: usize) -> [[f32; 3]; 3] {
@@ -131,30 +126,24 @@ const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
 #[inline(always)]
 pub(super) fn set_up<S: Simd>(simd: S, block: &TriangleBlock, at: &ScreenFromObject, window: Rect) -> Lanes {
     let halves = widen_corners(simd, block);
-    let [low, high] = halves.map(|corners| project(simd, &corners, at));
+    let low = project(simd, &halves[0], at);
+    let high = project(simd, &halves[1], at);
     let clip = (low.clip | high.clip << 8) & block.lanes;
 
     // Exact: coordinates have 24 bits, products 48, and f64 holds 53.
-    let area = |e: &Eight<S>| {
-        (e.snapped_x[1] - e.snapped_x[0]) * (e.snapped_y[2] - e.snapped_y[0])
-            - (e.snapped_x[2] - e.snapped_x[0]) * (e.snapped_y[1] - e.snapped_y[0])
-    };
     let zero = f64x8::splat(simd, 0.0);
-    let (area_low, area_high) = (area(&low), area(&high));
+    let (area_low, area_high) = (low.area(), high.area());
     let positive = sixteen_bits(area_low.simd_gt(zero).to_bitmask(), area_high.simd_gt(zero).to_bitmask());
     let negative = sixteen_bits(area_low.simd_lt(zero).to_bitmask(), area_high.simd_lt(zero).to_bitmask());
     let front = if at.front_sign > 0.0 { positive } else { negative };
     let facing = (front | ((positive | negative) & block.two_sided)) & block.lanes & !clip;
 
-    let x = [0, 1, 2].map(|k| to_i32(simd, low.snapped_x[k], high.snapped_x[k]));
-    let y = [0, 1, 2].map(|k| to_i32(simd, low.snapped_y[k], high.snapped_y[k]));
-    // First pixel whose centre 256·p + 128 is not left of the box, last one not right of it.
-    let first = |v: [i32x16<S>; 3]| (v[0].min(v[1]).min(v[2]) + 127) >> 8;
-    let last = |v: [i32x16<S>; 3]| (v[0].max(v[1]).max(v[2]) - 128) >> 8;
-    let left = first(x).max(i32x16::splat(simd, window.left));
-    let top = first(y).max(i32x16::splat(simd, window.top));
-    let right = last(x).min(i32x16::splat(simd, window.right - 1));
-    let bottom = last(y).min(i32x16::splat(simd, window.bottom - 1));
+    let x = to_i32(simd, &low.snapped_x, &high.snapped_x);
+    let y = to_i32(simd, &low.snapped_y, &high.snapped_y);
+    let left = first_pixel(&x).max(i32x16::splat(simd, window.left));
+    let top = first_pixel(&y).max(i32x16::splat(simd, window.top));
+    let right = last_pixel(&x).min(i32x16::splat(simd, window.right - 1));
+    let bottom = last_pixel(&y).min(i32x16::splat(simd, window.bottom - 1));
     let holds_a_centre = (left.simd_le(right) & top.simd_le(bottom)).to_bitmask() as u16;
     let draw = facing & holds_a_centre;
 
@@ -186,9 +175,11 @@ pub(super) fn set_up<S: Simd>(simd: S, block: &TriangleBlock, at: &ScreenFromObj
             planes[half][i].store_slice(&mut plane[half].0);
         }
     }
-    let d = [0, 1, 2].map(|k| narrow(simd, low.d[k], high.d[k]));
-    d[0].min(d[1]).min(d[2]).store_slice(&mut lanes.depth_min.0);
-    d[0].max(d[1]).max(d[2]).store_slice(&mut lanes.depth_max.0);
+    let d0 = simd.narrow_f64x8(low.d[0], high.d[0]);
+    let d1 = simd.narrow_f64x8(low.d[1], high.d[1]);
+    let d2 = simd.narrow_f64x8(low.d[2], high.d[2]);
+    d0.min(d1).min(d2).store_slice(&mut lanes.depth_min.0);
+    d0.max(d1).max(d2).store_slice(&mut lanes.depth_max.0);
     lanes
 }
 
@@ -208,33 +199,30 @@ fn widen_corners<S: Simd>(simd: S, block: &TriangleBlock) -> [[[f64x8<S>; 3]; 3]
 
 #[inline(always)]
 fn project<S: Simd>(simd: S, corners: &[[f64x8<S>; 3]; 3], at: &ScreenFromObject) -> Eight<S> {
-    let splat = |v: f64| f64x8::splat(simd, v);
-    let dot = |row: &[f64; 4], p: &[f64x8<S>; 3]| {
-        ((splat(row[0]) * p[0] + splat(row[1]) * p[1]) + splat(row[2]) * p[2]) + splat(row[3])
-    };
-    let zero = splat(0.0);
+    let zero = f64x8::splat(simd, 0.0);
     let (mut x, mut y, mut d) = ([zero; 3], [zero; 3], [zero; 3]);
     let (mut snapped_x, mut snapped_y) = ([zero; 3], [zero; 3]);
     let mut inside = 0xFFu64;
-    let (guard_min, guard_max) = (splat(GUARD_MIN * 256.0), splat(GUARD_MAX * 256.0));
+    let (guard_min, guard_max) =
+        (f64x8::splat(simd, GUARD_MIN * 256.0), f64x8::splat(simd, GUARD_MAX * 256.0));
     for k in 0..3 {
-        (x[k], y[k]) = (dot(&at.x, &corners[k]), dot(&at.y, &corners[k]));
+        (x[k], y[k]) = (dot(simd, &at.x, &corners[k]), dot(simd, &at.y, &corners[k]));
         if at.perspective {
-            let w = dot(&at.w, &corners[k]);
-            let reciprocal = splat(1.0) / w;
+            let w = dot(simd, &at.w, &corners[k]);
+            let reciprocal = f64x8::splat(simd, 1.0) / w;
             x[k] *= reciprocal;
             y[k] *= reciprocal;
-            d[k] = splat(at.d[3]) * reciprocal;
+            d[k] = f64x8::splat(simd, at.d[3]) * reciprocal;
             // D ≤ W, and W > 0: behind the eye the quotient would be negative.
-            inside &= (splat(at.d[3]).simd_le(w)).to_bitmask();
+            inside &= (f64x8::splat(simd, at.d[3]).simd_le(w)).to_bitmask();
         } else {
-            d[k] = dot(&at.d, &corners[k]);
-            inside &= d[k].simd_le(splat(1.0)).to_bitmask();
+            d[k] = dot(simd, &at.d, &corners[k]);
+            inside &= d[k].simd_le(f64x8::splat(simd, 1.0)).to_bitmask();
         }
         inside &= (x[k].simd_ge(guard_min) & x[k].simd_le(guard_max)).to_bitmask();
         inside &= (y[k].simd_ge(guard_min) & y[k].simd_le(guard_max)).to_bitmask();
-        snapped_x[k] = x[k] + splat(ROUND) - splat(ROUND);
-        snapped_y[k] = y[k] + splat(ROUND) - splat(ROUND);
+        snapped_x[k] = x[k] + f64x8::splat(simd, ROUND) - f64x8::splat(simd, ROUND);
+        snapped_y[k] = y[k] + f64x8::splat(simd, ROUND) - f64x8::splat(simd, ROUND);
     }
     Eight { x, y, d, snapped_x, snapped_y, clip: !inside as u16 & 0xFF }
 }
@@ -242,33 +230,59 @@ fn project<S: Simd>(simd: S, corners: &[[f64x8<S>; 3]; 3], at: &ScreenFromObject
 /// Depth as a plane over image pixel centres, from the unsnapped corners.
 #[inline(always)]
 fn depth_plane<S: Simd>(simd: S, e: &Eight<S>) -> [f64x8<S>; 3] {
-    let splat = |v: f64| f64x8::splat(simd, v);
     let (x1, y1, d1) = (e.x[1] - e.x[0], e.y[1] - e.y[0], e.d[1] - e.d[0]);
     let (x2, y2, d2) = (e.x[2] - e.x[0], e.y[2] - e.y[0], e.d[2] - e.d[0]);
-    let per_pixel = splat(256.0) / (x1 * y2 - x2 * y1);
-    let sane = |slope: f64x8<S>| {
-        let bound = splat(MAX_SLOPE);
-        // False for NaN too: a triangle seen exactly edge-on gets a flat plane and is clamped anyway.
-        slope.abs().simd_le(bound).select(slope, splat(0.0))
-    };
-    let a = sane((d1 * y2 - d2 * y1) * per_pixel);
-    let b = sane((d2 * x1 - d1 * x2) * per_pixel);
-    let to_pixel = splat(1.0 / 256.0);
-    let half = splat(0.5);
+    let per_pixel = f64x8::splat(simd, 256.0) / (x1 * y2 - x2 * y1);
+    let a = sane(simd, (d1 * y2 - d2 * y1) * per_pixel);
+    let b = sane(simd, (d2 * x1 - d1 * x2) * per_pixel);
+    let to_pixel = f64x8::splat(simd, 1.0 / 256.0);
+    let half = f64x8::splat(simd, 0.5);
     // At pixel (0, 0)'s centre: from corner 0, back by its distance to that centre.
     let c = e.d[0] - a * (e.x[0] * to_pixel - half) - b * (e.y[0] * to_pixel - half);
     [a, b, c]
 }
 
+/// A slope, or 0 where it is too steep or no number: a triangle seen edge-on, whose depth is clamped anyway.
 #[inline(always)]
-fn to_i32<S: Simd>(simd: S, low: f64x8<S>, high: f64x8<S>) -> i32x16<S> {
-    let round = f64x8::splat(simd, ROUND);
-    simd.narrow_i64x8((low + round).bitcast(), (high + round).bitcast())
+fn sane<S: Simd>(simd: S, slope: f64x8<S>) -> f64x8<S> {
+    slope.abs().simd_le(f64x8::splat(simd, MAX_SLOPE)).select(slope, f64x8::splat(simd, 0.0))
 }
 
 #[inline(always)]
-fn narrow<S: Simd>(simd: S, low: f64x8<S>, high: f64x8<S>) -> f32x16<S> {
-    simd.narrow_f64x8(low, high)
+fn dot<S: Simd>(simd: S, row: &[f64; 4], p: &[f64x8<S>; 3]) -> f64x8<S> {
+    let xy = f64x8::splat(simd, row[0]) * p[0] + f64x8::splat(simd, row[1]) * p[1];
+    (xy + f64x8::splat(simd, row[2]) * p[2]) + f64x8::splat(simd, row[3])
+}
+
+/// First pixel whose centre 256·p + 128 is not before a box's smallest coordinate.
+#[inline(always)]
+fn first_pixel<S: Simd>(v: &[i32x16<S>; 3]) -> i32x16<S> {
+    (v[0].min(v[1]).min(v[2]) + 127) >> 8
+}
+
+/// Last pixel whose centre is not beyond its largest.
+#[inline(always)]
+fn last_pixel<S: Simd>(v: &[i32x16<S>; 3]) -> i32x16<S> {
+    (v[0].max(v[1]).max(v[2]) - 128) >> 8
+}
+
+impl<S: Simd> Eight<S> {
+    /// Doubled area on the screen (y down), 1/65536 pixel, exact.
+    #[inline(always)]
+    fn area(&self) -> f64x8<S> {
+        let (x, y) = (&self.snapped_x, &self.snapped_y);
+        (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
+    }
+}
+
+#[inline(always)]
+fn to_i32<S: Simd>(simd: S, low: &[f64x8<S>; 3], high: &[f64x8<S>; 3]) -> [i32x16<S>; 3] {
+    let round = f64x8::splat(simd, ROUND);
+    let mut out = [i32x16::splat(simd, 0); 3];
+    for k in 0..3 {
+        out[k] = simd.narrow_i64x8((low[k] + round).bitcast(), (high[k] + round).bitcast());
+    }
+    out
 }
 
 #[inline(always)]

@@ -2,6 +2,7 @@
 
 mod blend;
 mod frame;
+mod queue;
 mod shade;
 mod walk;
 

@@ -6,7 +6,7 @@
 //!     take the nearest open entry; if the z-pyramid hides its rectangle at its nearest depth: drop it
 //!     a block of triangles: draw it
 //!     an instance: enter its tree, with its transform composed in f64
-//!     a node: project its sixteen boxes; push those that may hold a pixel centre, farthest first
+//!     a node: project its sixteen boxes; open those that may hold a pixel centre
 //! ```
 //!
 //! The order only saves work: whatever it is, the window ends up the same (see `raster`). Entries are
@@ -15,10 +15,13 @@
 //! The plain z-buffer is the same walk with every test against the pyramid left out: it visits all that
 //! lies in the frustum and draws all of it.
 
+use super::queue::NearestFirst;
 use super::{Algorithm, Counters};
 use crate::conventions::View;
 use crate::index::{BlockTree, Child, GroupIndex, SceneIndex, Slot, WideTree};
-use crate::raster::{BoxSet, Drawing, ProjectedBoxes, Rect, ScreenFromObject, Target, draw_block, project_boxes};
+use crate::raster::{
+    BoxSet, Drawing, ProjectedBoxes, Rect, ScreenFromObject, Target, draw_block, project_boxes,
+};
 use crate::scene::{Content, Scene};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::DVec3;
@@ -63,7 +66,7 @@ struct Entry {
 struct Walk<'a> {
     index: &'a SceneIndex,
     contexts: Vec<Context<'a>>,
-    open: Vec<Entry>,
+    open: NearestFirst<Entry>,
     window: Rect,
     hierarchical: bool,
     counters: Counters,
@@ -86,7 +89,7 @@ fn walk<S: Simd>(
     let mut walk = Walk {
         index,
         contexts: Vec::with_capacity(16),
-        open: Vec::with_capacity(256),
+        open: NearestFirst::new(),
         window,
         hierarchical: algorithm == Algorithm::Hzb,
         counters: Counters::default(),
@@ -98,8 +101,6 @@ fn walk<S: Simd>(
             walk.counters.nodes_culled += 1;
             continue;
         }
-        // Everything entered after this entry's tree is done with.
-        walk.contexts.truncate(entry.context as usize + 1);
         match entry.slot.child() {
             Child::Node(node) => walk.visit_node(simd, entry.context, entry.moving, node),
             Child::Leaf(leaf) => walk.visit_leaf(simd, target, entry.context, leaf),
@@ -167,7 +168,7 @@ impl<'a> Walk<'a> {
         self.push_children(&projected, alive, &node.child, context, moving);
     }
 
-    /// Pushes the children in `alive`, farthest first.
+    /// Opens the children in `alive`.
     #[inline(always)]
     fn push_children(
         &mut self,
@@ -177,9 +178,6 @@ impl<'a> Walk<'a> {
         context: u32,
         moving: bool,
     ) {
-        // Depths are not negative, so their bits sort as they do; the lane rides along.
-        let mut order = [0u64; 16];
-        let mut count = 0;
         let mut rest = alive;
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize;
@@ -187,19 +185,8 @@ impl<'a> Walk<'a> {
             if child[lane] == Slot::EMPTY {
                 continue;
             }
-            let key = u64::from(projected.depth[lane].max(0.0).to_bits()) << 8 | lane as u64;
-            let mut at = count;
-            while at > 0 && order[at - 1] > key {
-                order[at] = order[at - 1];
-                at -= 1;
-            }
-            order[at] = key;
-            count += 1;
-        }
-        for key in &order[..count] {
-            let lane = (key & 0xFF) as usize;
             let edge = |side: &[f32; 16]| side[lane] as u16;
-            self.open.push(Entry {
+            let entry = Entry {
                 slot: child[lane],
                 context,
                 moving,
@@ -210,7 +197,8 @@ impl<'a> Walk<'a> {
                     edge(&projected.bottom),
                 ],
                 depth: projected.depth[lane],
-            });
+            };
+            self.open.push(entry, entry.depth.max(0.0));
         }
     }
 
@@ -226,8 +214,9 @@ impl<'a> Walk<'a> {
             Space::Mesh { blocks, mesh } => {
                 let block = &blocks.blocks[leaf as usize];
                 let scene = self.index.scene();
-                let mut is_hole =
-                    |lane: usize, x, y| is_hole(scene, mesh, block.triangle[lane], &block.corners(lane), &c.at, x, y);
+                let mut is_hole = |lane: usize, x, y| {
+                    is_hole(scene, mesh, block.triangle[lane], &block.corners(lane), &c.at, x, y)
+                };
                 let drawing = Drawing { instance: c.instance, at: &c.at, hierarchical: self.hierarchical };
                 let counts = simd.vectorize(
                     #[inline(always)]
@@ -259,12 +248,8 @@ fn is_hole(
 pub(super) fn barycentric(corners: &[[f32; 3]; 3], at: &ScreenFromObject, x: i32, y: i32) -> DVec3 {
     let v = corners.map(|c| at.point(c.map(f64::from))).map(|p| DVec3::new(p[0], p[1], p[2]));
     let pixel = DVec3::new(f64::from(x * 256 + 128), f64::from(y * 256 + 128), 1.0);
-    let weights = DVec3::new(
-        pixel.dot(v[1].cross(v[2])),
-        pixel.dot(v[2].cross(v[0])),
-        pixel.dot(v[0].cross(v[1])),
-    );
+    let weights =
+        DVec3::new(pixel.dot(v[1].cross(v[2])), pixel.dot(v[2].cross(v[0])), pixel.dot(v[0].cross(v[1])));
     let sum = weights.x + weights.y + weights.z;
     weights / sum
 }
-
