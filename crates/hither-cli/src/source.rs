@@ -1,0 +1,43 @@
+//! Scenes by name: a model file, or a generated world.
+
+use crate::console::Verbosity;
+use crate::failure::Failure;
+use hither::scene::Scene;
+use std::path::Path;
+
+/// The prefix of a generated world.
+const WORLD: &str = "world:";
+
+/// Reads or generates the scene called `name`, and prints what was odd about its file.
+pub fn open(name: &str, verbosity: Verbosity) -> Result<Scene, Failure> {
+    if let Some(spec) = name.strip_prefix(WORLD) {
+        return generate(spec, verbosity);
+    }
+    let path = Path::new(name);
+    let spinner = verbosity.spinner(format!("reading {name}"));
+    let loaded = hither_io::read(path);
+    spinner.finish_and_clear();
+    let loaded = loaded.map_err(|error| unknown(name, error))?;
+    for diagnostic in &loaded.diagnostics {
+        verbosity.warning(&format!("{name}: {diagnostic}"));
+    }
+    Ok(loaded.scene)
+}
+
+/// Generates a world from its spec, with or without the prefix.
+pub fn generate(spec: &str, verbosity: Verbosity) -> Result<Scene, Failure> {
+    let spec = spec.strip_prefix(WORLD).unwrap_or(spec);
+    let spinner = verbosity.spinner(format!("generating {spec}"));
+    let scene = hither_worlds::generate(spec);
+    spinner.finish_and_clear();
+    scene.map_err(|error| Failure::work(format!("{WORLD}{spec}: {error}")))
+}
+
+/// A missing file that is called like a world was probably meant to be one.
+fn unknown(name: &str, error: hither_io::Error) -> Failure {
+    let stem = name.split('?').next().unwrap_or(name);
+    if hither_worlds::list().iter().any(|world| world.name == stem) && !Path::new(name).exists() {
+        return Failure::work(format!("{error}; for the generated world write \"{WORLD}{name}\""));
+    }
+    error.into()
+}

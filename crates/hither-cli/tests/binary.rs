@@ -1,0 +1,226 @@
+//! The binary as a user meets it: exit codes, one clear line for each mistake, reports, and no partial files.
+
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+/// A small world with cameras and an animation.
+const WORLD: &str = "world:office?n=1";
+
+/// A folder of its own for a test, removed when dropped.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Folder {
+        let path = std::env::temp_dir().join(format!("hither-cli-{name}-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).unwrap();
+        Folder(path)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).display().to_string()
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(&self.0).unwrap();
+        let mut names: Vec<String> =
+            entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn hither(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hither")).args(arguments).output().unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// Runs `arguments`, which must fail with `code` in one line that contains `words`, and print no result.
+#[track_caller]
+fn refused(arguments: &[&str], code: i32, words: &[&str]) {
+    let output = hither(arguments);
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {text}");
+    let errors: Vec<&str> = text.lines().filter(|l| !l.starts_with("note: ")).collect();
+    assert_eq!(errors.len(), 1, "{arguments:?}: {text}");
+    assert!(errors[0].starts_with("error: "), "{text}");
+    for word in words {
+        assert!(errors[0].contains(word), "{arguments:?}: no `{word}` in: {text}");
+    }
+    assert!(output.stdout.is_empty(), "{arguments:?}: {}", stdout(&output));
+}
+
+/// Runs `arguments`, which must do their work.
+#[track_caller]
+fn done(arguments: &[&str]) -> Output {
+    let output = hither(arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+    output
+}
+
+#[test]
+fn a_wrong_command_line_is_code_2() {
+    refused(&["rendre"], 2, &["rendre", "render", "--help"]);
+    refused(&["render"], 2, &["SCENE"]);
+    refused(&["render", WORLD], 2, &["-o <FILE>"]);
+    refused(&["render", WORLD, "-o", "x.jpg"], 2, &["x.jpg", ".png or .exr"]);
+    refused(&["render", WORLD, "-o", "x.png", "--size", "640"], 2, &["640", "1280x720"]);
+    refused(&["render", WORLD, "-o", "x.png", "--eye", "1,2"], 2, &["1,2", "three numbers"]);
+    refused(&["render", WORLD, "-o", "x.png", "--target", "1,2,3"], 2, &["--eye"]);
+    refused(&["render", WORLD, "-o", "x.png", "--camera", "0", "--eye", "1,2,3"], 2, &["--camera", "--eye"]);
+    refused(&["render", WORLD, "-o", "x.png", "--eye", "1,2,3", "--target", "1,2,3"], 2, &["same point"]);
+    refused(&["render", WORLD, "-o", "x.png", "--fov", "180"], 2, &["degrees"]);
+    refused(&["render", WORLD, "-o", "x.png", "--frames", "4..4"], 2, &["0..250"]);
+    refused(&["render", WORLD, "-o", "x.png", "--frames", "0..4", "--time", "1"], 2, &["--time", "--frames"]);
+    refused(&["render", WORLD, "-o", "x.png", "--algorithm", "magic"], 2, &["magic", "zbuffer"]);
+    refused(&["render", WORLD, "-o", "x.png", "-q", "-v"], 2, &["--quiet", "--verbose"]);
+    refused(&["info"], 2, &["SCENE"]);
+    refused(&["world", "office"], 2, &["-o"]);
+    refused(&["world", "office", "-o", "office.obj"], 2, &["office.obj", ".glb"]);
+    assert!(!Path::new("x.png").exists());
+}
+
+#[test]
+fn an_input_that_fails_is_code_1() {
+    let folder = Folder::new("input");
+    let picture = folder.path("x.png");
+    refused(&["info", "no/such/file.glb"], 1, &["no/such/file.glb", "cannot read"]);
+    refused(&["info", "office"], 1, &["world:office"]);
+    refused(&["info", "world:offices"], 1, &["offices", "office, "]);
+    refused(&["info", "world:office?m=1"], 1, &["\"m\"", "n (1 to"]);
+    refused(&["info", "world:office?n=0"], 1, &["n=0", "from 1 to"]);
+    refused(&["world", "offices", "-o", &folder.path("x.glb")], 1, &["offices"]);
+    refused(&["render", WORLD, "-o", &picture, "--camera", "attic"], 1, &["\"attic\"", "\"corridor\""]);
+    refused(&["render", WORLD, "-o", &picture, "--animation", "run"], 1, &["\"run\"", "\"walk\""]);
+    refused(&["render", WORLD, "-o", &picture, "--size", "0x720"], 1, &["0x720"]);
+    refused(&["render", WORLD, "-o", &picture, "--size", "20000x1"], 1, &["20000x1", "16384"]);
+    fs::write(folder.0.join("noise.glb"), "glTX and more").unwrap();
+    refused(&["render", &folder.path("noise.glb"), "-o", &picture], 1, &["noise.glb"]);
+    assert_eq!(folder.names(), ["noise.glb"]);
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_refused_before_the_work() {
+    let folder = Folder::new("output");
+    let missing = folder.path("nowhere/x.png");
+    // The scene does not exist either; that the output is named shows which was looked at first.
+    refused(&["render", "no.glb", "-o", &missing], 1, &["nowhere/x.png", "make it first"]);
+    refused(&["render", "no.glb", "-o", &missing, "--frames", "0..2"], 1, &["nowhere/x.0000.png"]);
+    refused(&["render", "no.glb", "--json", &missing], 1, &["nowhere/x.png"]);
+    refused(&["world", "no", "-o", &folder.path("nowhere/x.glb")], 1, &["nowhere/x.glb"]);
+    assert!(folder.names().is_empty());
+}
+
+#[test]
+fn pictures_have_the_size_and_the_names_that_were_asked_for() {
+    let folder = Folder::new("pictures");
+    done(&["render", WORLD, "-o", &folder.path("one.png"), "--size", "64x48"]);
+    done(&["render", WORLD, "-o", &folder.path("walk.png"), "--size", "16x16", "--frames", "3..5"]);
+    done(&["render", WORLD, "-o", &folder.path("##-walk.EXR"), "--size", "16x16", "--frames", "9..10"]);
+    assert_eq!(folder.names(), ["09-walk.EXR", "one.png", "walk.0003.png", "walk.0004.png"]);
+    let png = fs::read(folder.0.join("one.png")).unwrap();
+    assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
+    assert_eq!(png[16..24], [0, 0, 0, 64, 0, 0, 0, 48]);
+    let exr = fs::read(folder.0.join("09-walk.EXR")).unwrap();
+    assert_eq!(exr[..4], [0x76, 0x2f, 0x31, 0x01]);
+}
+
+#[test]
+fn the_report_says_what_was_done() {
+    let folder = Folder::new("report");
+    let file = folder.path("report.json");
+    done(&[
+        "render", WORLD, "--camera", "walk", "--size", "32x24", "--frames", "0..3", "--fps", "2", "--json",
+        &file,
+    ]);
+    let report: Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
+    let first_key = report.as_object().unwrap().keys().next().unwrap();
+    assert_eq!((first_key.as_str(), &report["schema"]), ("schema", &"hither.render/1".into()));
+    assert!(report["engine_version"].is_string());
+    assert_eq!(report["camera"]["name"], "walk");
+    assert_eq!(report["triangles"], 15_000);
+    assert_eq!((&report["width"], &report["height"]), (&32.into(), &24.into()));
+    let frames = report["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 3);
+    for (i, frame) in frames.iter().enumerate() {
+        assert_eq!(frame["frame"], i);
+        assert_eq!(frame["scene_time_ms"], 500.0 * i as f64);
+        assert!(frame["time_ms"].as_f64().unwrap() >= 0.0);
+        for counter in
+            ["nodes_visited", "nodes_culled", "triangles_tested", "triangles_drawn", "pixels_written"]
+        {
+            assert!(frame["counters"][counter].is_u64(), "{counter}");
+        }
+        assert!(frame["counters"].as_object().unwrap().contains_key("depth_complexity"));
+    }
+    assert_ne!(frames[0]["eye"], frames[2]["eye"], "the camera walks");
+}
+
+#[test]
+fn a_report_on_standard_output_is_nothing_but_json() {
+    let output = done(&["render", WORLD, "--size", "8x8", "--json", "-"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["frames"].as_array().unwrap().len(), 1);
+    let output = done(&["info", WORLD, "--json", "-"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["schema"], "hither.info/1");
+    assert_eq!(report["cameras"][0]["name"], "corridor");
+    assert!(report["bounds"]["max"][0].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn info_prints_what_is_in_a_world() {
+    let text = stdout(&done(&["info", "world:office?n=33"]));
+    for part in ["539,055,000 shown, 15,000 stored", "35,937 of 1 mesh", "\"corridor\"", "fov 60", "10 s"] {
+        assert!(text.contains(part), "no `{part}` in {text}");
+    }
+}
+
+#[test]
+fn worlds_are_listed_and_help_is_printed() {
+    assert!(stdout(&done(&["world"])).contains("office"));
+    assert!(stdout(&done(&["--help"])).contains("render"));
+    assert!(stdout(&done(&["render", "--help"])).contains("--camera"));
+    assert!(stdout(&done(&["--version"])).starts_with("hither "));
+}
+
+#[test]
+fn quiet_is_quiet_and_a_choice_is_said() {
+    let folder = Folder::new("quiet");
+    let picture = folder.path("x.png");
+    let quiet = done(&["render", WORLD, "-o", &picture, "--size", "8x8", "-q"]);
+    assert!(quiet.stdout.is_empty() && quiet.stderr.is_empty());
+    let normal = done(&["render", WORLD, "-o", &picture, "--size", "8x8"]);
+    assert!(stderr(&normal).contains("camera 0 (\"corridor\")"));
+    let verbose = done(&["render", WORLD, "-o", &picture, "--size", "8x8", "-v"]);
+    assert!(stderr(&verbose).contains("nodes visited"));
+}
+
+#[test]
+fn a_reader_that_leaves_early_is_no_error() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_hither"))
+        .args(["info", WORLD])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(output.stderr.is_empty());
+}
