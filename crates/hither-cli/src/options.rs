@@ -4,7 +4,7 @@ use crate::console::Verbosity;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use hither::index::TreeKind;
-use hither::render::{Algorithm, Shading};
+use hither::render::{Algorithm, ComplexityPanel, Shading};
 use hither::{IndexOptions, RenderOptions};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -144,19 +144,35 @@ pub enum ShadeName {
     Depth,
     /// Normals as colours
     Normals,
-    /// Where the work was done
+    /// How often each pixel was visited, on a log scale
     Complexity,
+    /// Of these, by tests of boxes against the z-pyramid
+    ComplexityCubes,
+    /// Of these, by tests and drawing of triangles
+    ComplexityPolygons,
 }
 
-impl From<ShadeName> for Shading {
-    fn from(name: ShadeName) -> Shading {
-        match name {
+impl ShadeName {
+    /// The engine's name for it.
+    pub fn shading(self) -> Shading {
+        match self {
             ShadeName::Flat => Shading::Flat,
             ShadeName::Smooth => Shading::Smooth,
             ShadeName::Ids => Shading::Ids,
             ShadeName::Depth => Shading::Depth,
             ShadeName::Normals => Shading::Normals,
-            ShadeName::Complexity => Shading::Complexity,
+            ShadeName::Complexity | ShadeName::ComplexityCubes | ShadeName::ComplexityPolygons => {
+                Shading::Complexity
+            }
+        }
+    }
+
+    /// The part of the complexity that is shown alone.
+    pub fn panel(self) -> Option<ComplexityPanel> {
+        match self {
+            ShadeName::ComplexityCubes => Some(ComplexityPanel::Cubes),
+            ShadeName::ComplexityPolygons => Some(ComplexityPanel::Polygons),
+            _ => None,
         }
     }
 }

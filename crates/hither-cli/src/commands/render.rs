@@ -10,7 +10,7 @@ use crate::outputs::{self, PictureFormat};
 use crate::source;
 use crate::timeline::Timeline;
 use hither::conventions::{NO_ID, SurfaceId};
-use hither::render::{Frame, Image, shade};
+use hither::render::{Frame, Image, Shader, Shading, complexity_image};
 use hither::scene::LINEAR_FROM_SRGB;
 use hither::{Renderer, Scene, SceneIndex};
 use hither_io::ExrImage;
@@ -105,9 +105,10 @@ impl Job<'_> {
     /// Draws every frame and returns their reports.
     fn draw(&self, index: &mut SceneIndex) -> Result<Vec<Value>, Failure> {
         let verbosity = self.arguments.report.verbosity();
-        let complexity = matches!(self.arguments.shade, ShadeName::Complexity);
+        let complexity = self.arguments.shade.shading() == Shading::Complexity;
         let options = self.arguments.work.render(complexity);
         let mut renderer = Renderer::new();
+        let mut shader = Shader::new(index.scene(), options.threads);
         let mut reports = Vec::new();
         let bar = verbosity.bar(self.timeline.frames.len() as u64, "pictures");
         for &(number, time) in &self.timeline.frames {
@@ -116,7 +117,7 @@ impl Job<'_> {
             let start = Instant::now();
             let frame = renderer.render(index, &view, &options).map_err(|e| Failure::work(e.to_string()))?;
             let render_time = start.elapsed();
-            let file = self.write(index, &frame, number)?;
+            let file = self.write(&mut shader, index.scene(), &frame, number)?;
             let seen = if self.wants_counts { Seen::count(&frame) } else { Seen::default() };
             bar.suspend(|| {
                 verbosity.detail(&frame_line(&frame, &seen, number, render_time));
@@ -138,10 +139,18 @@ impl Job<'_> {
     }
 
     /// Shades and writes a frame, if a picture is asked for; returns its file.
-    fn write(&self, index: &SceneIndex, frame: &Frame, number: u32) -> Result<Option<PathBuf>, Failure> {
+    fn write(
+        &self,
+        shader: &mut Shader,
+        scene: &Scene,
+        frame: &Frame,
+        number: u32,
+    ) -> Result<Option<PathBuf>, Failure> {
         let (Some(output), Some(format)) = (&self.arguments.output, self.format) else { return Ok(None) };
         let path = if self.timeline.numbered { outputs::numbered(output, number) } else { output.clone() };
-        let mut image = shade(index, frame, self.arguments.shade.into());
+        let panel = self.arguments.shade.panel().and_then(|panel| complexity_image(frame, panel));
+        let shading = self.arguments.shade.shading();
+        let mut image = panel.unwrap_or_else(|| shader.shade(scene, frame, shading));
         if let Some(background) = self.arguments.background {
             put_behind(&mut image, background);
         }

@@ -116,7 +116,7 @@ impl View {
         let true_up = right.cross(forward);
         let rotation = DMat3::from_cols(right, true_up, -forward).transpose();
         View {
-            view_from_world: DAffine3 { matrix3: rotation.into(), translation: rotation * -eye },
+            view_from_world: DAffine3 { matrix3: rotation, translation: rotation * -eye },
             projection,
             width: size.0,
             height: size.1,
