@@ -97,7 +97,13 @@ impl WorkOptions {
             AlgorithmName::Hzb => Algorithm::Hzb,
             AlgorithmName::Zbuffer => Algorithm::ZBuffer,
         };
-        RenderOptions { algorithm, threads: self.threads, coherence: self.coherence, complexity }
+        RenderOptions {
+            algorithm,
+            threads: self.threads,
+            coherence: self.coherence,
+            complexity,
+            ..RenderOptions::default()
+        }
     }
 
     /// The engine's options for indexing.

@@ -127,6 +127,7 @@ impl Job<'_> {
             });
             bar.inc(1);
             reports.push(frame_json(&frame, &seen, number, time, render_time, file.as_deref()));
+            renderer.recycle(frame);
         }
         bar.finish_and_clear();
         if let (Some(output), true) = (&self.arguments.output, self.timeline.numbered) {
