@@ -12,6 +12,7 @@ mod exr;
 mod format;
 mod gltf;
 mod png;
+mod polygon;
 mod srgb;
 #[allow(dead_code)] // its users follow
 mod texture;
