@@ -1,7 +1,7 @@
 //! What can go wrong with a file, and what can be odd about one that is read all the same.
 
 use hither::scene::Scene;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a file was not read or written. The text is one line for the user: what, where, what to do.
 #[derive(Debug, thiserror::Error)]
@@ -56,4 +56,14 @@ pub struct Loaded {
     pub scene: Scene,
     /// Oddities, each once.
     pub diagnostics: Vec<Diagnostic>,
+}
+
+impl Loaded {
+    /// A scene read from `path`, checked.
+    pub(crate) fn checked(path: &Path, scene: Scene, diagnostics: Vec<Diagnostic>) -> Result<Loaded, Error> {
+        match scene.validate() {
+            Ok(()) => Ok(Loaded { scene, diagnostics }),
+            Err(fault) => Err(Error::Malformed { path: path.to_owned(), message: fault.to_string() }),
+        }
+    }
 }

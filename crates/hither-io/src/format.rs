@@ -12,9 +12,11 @@ use std::path::Path;
 pub(crate) enum Format {
     /// glTF 2.0, as text or binary.
     Gltf,
+    /// Wavefront OBJ.
+    Obj,
 }
 
-const KNOWN: &str = ".glb or .gltf";
+const KNOWN: &str = ".glb, .gltf or .obj";
 
 /// The format of the file at `path`.
 pub(crate) fn recognise(path: &Path) -> Result<Format, Error> {
@@ -53,6 +55,7 @@ fn by_content(start: &[u8]) -> Option<Format> {
 fn by_extension(extension: &str) -> Option<Format> {
     match extension {
         "glb" | "gltf" => Some(Format::Gltf),
+        "obj" => Some(Format::Obj),
         _ => None,
     }
 }

@@ -11,9 +11,12 @@ mod error;
 mod exr;
 mod format;
 mod gltf;
+pub mod obj;
+mod oddities;
 mod png;
 mod polygon;
 mod srgb;
+mod text;
 #[allow(dead_code)] // its users follow
 mod texture;
 
@@ -33,5 +36,6 @@ use std::path::Path;
 pub fn read(path: &Path) -> Result<Loaded, Error> {
     match format::recognise(path)? {
         Format::Gltf => gltf::read(path),
+        Format::Obj => obj::read(path),
     }
 }

@@ -1,0 +1,254 @@
+//! From an OBJ file's statements to meshes: parts gathered, polygons cut, vertices shared.
+
+use super::materials::Materials;
+use super::parse::{Corner, NONE, Run, Statements};
+use crate::oddities::Oddities;
+use crate::polygon::{self, Fit, Triangulator};
+use glam::{Vec2, Vec3, Vec4};
+use hither::scene::{Content, Material, Mesh, Node, Primitive, Scene};
+
+/// Makes a mesh and a node of every part that has triangles.
+pub(super) fn build(statements: Statements, materials: Materials, oddities: &mut Oddities) -> Scene {
+    let mut scene = Scene::new("");
+    let mut runs_of_part: Vec<Vec<usize>> = vec![Vec::new(); statements.parts.len()];
+    for (i, run) in statements.runs.iter().enumerate() {
+        runs_of_part[run.part as usize].push(i);
+    }
+    let mut welder = Welder { first: vec![NONE; statements.positions.len()], vertices: Vec::new() };
+    let mut builder = Builder {
+        normals: statements.normals.clone(),
+        statements,
+        materials,
+        default_material: None,
+        triangulator: Triangulator::default(),
+        cut: Vec::new(),
+        outline: Vec::new(),
+        oddities,
+    };
+    for (part, runs) in runs_of_part.iter().enumerate() {
+        let mesh = builder.mesh(part, runs, &mut welder);
+        if !mesh.triangles.is_empty() {
+            let content = Content::Mesh(scene.meshes.len() as u32);
+            scene.groups[0].push(Node { name: mesh.name.clone(), content, ..Node::default() });
+            scene.meshes.push(mesh);
+        }
+    }
+    scene.materials = builder.materials.list;
+    scene.textures = builder.materials.textures;
+    scene
+}
+
+struct Builder<'a> {
+    statements: Statements,
+    /// The file's normals, and then those of faces that have none beside faces that have.
+    normals: Vec<Vec3>,
+    materials: Materials,
+    default_material: Option<u32>,
+    triangulator: Triangulator,
+    cut: Vec<[u32; 3]>,
+    outline: Vec<Vec3>,
+    oddities: &'a mut Oddities,
+}
+
+impl Builder<'_> {
+    fn mesh(&mut self, part: usize, runs: &[usize], welder: &mut Welder) -> Mesh {
+        let mut mesh = Mesh { name: std::mem::take(&mut self.statements.parts[part]), ..Mesh::default() };
+        let normals = self.attribute(runs, |[_, _, normal]| normal);
+        let uvs = self.attribute(runs, |[_, uv, _]| uv);
+        for &at in runs {
+            let run = self.statements.runs[at];
+            let end = self
+                .statements
+                .runs
+                .get(at + 1)
+                .map_or(self.statements.faces.len(), |r| r.first_face as usize);
+            let first_triangle = mesh.triangles.len() as u32;
+            for face in run.first_face as usize..end {
+                if normals == Presence::Mixed {
+                    self.give_normal(face);
+                }
+                self.face(face, &mut mesh.triangles, welder);
+            }
+            self.end_run(run, first_triangle, &mut mesh);
+        }
+        let vertices = welder.take();
+        let of = |i: usize| vertices.iter().map(move |v| v.corner[i]);
+        mesh.positions = of(0).map(|i| self.statements.positions[i as usize]).collect();
+        if normals != Presence::Nowhere {
+            mesh.normals = of(2).map(|i| self.normals[i as usize]).collect();
+        }
+        if uvs != Presence::Nowhere {
+            mesh.uvs =
+                of(1).map(|i| self.statements.uvs.get(i as usize).copied().unwrap_or(Vec2::ZERO)).collect();
+        }
+        let colors = &self.statements.colors;
+        let color = |i: u32| colors.get(i as usize).copied().unwrap_or(Vec4::ONE);
+        if !colors.is_empty() && of(0).any(|i| color(i) != Vec4::ONE) {
+            mesh.colors = of(0).map(color).collect();
+        }
+        mesh
+    }
+
+    /// Whether the corners of a part have an attribute.
+    fn attribute(&self, runs: &[usize], of: impl Fn(&Corner) -> &u32) -> Presence {
+        let (mut some, mut none) = (false, false);
+        for &at in runs {
+            let run = self.statements.runs[at];
+            let end = self
+                .statements
+                .runs
+                .get(at + 1)
+                .map_or(self.statements.faces.len(), |r| r.first_face as usize);
+            let corners = self.corners(run.first_face as usize).start..self.corners(end - 1).end;
+            for corner in &self.statements.corners[corners] {
+                if *of(corner) == NONE {
+                    none = true;
+                } else {
+                    some = true;
+                }
+            }
+        }
+        match (some, none) {
+            (true, true) => Presence::Mixed,
+            (true, false) => Presence::Everywhere,
+            (false, _) => Presence::Nowhere,
+        }
+    }
+
+    fn corners(&self, face: usize) -> std::ops::Range<usize> {
+        let faces = &self.statements.faces;
+        let start = if face == 0 { 0 } else { faces[face - 1].end as usize };
+        start..faces[face].end as usize
+    }
+
+    /// Gives the corners of a face that have no normal the face's own, so that it is drawn flat.
+    fn give_normal(&mut self, face: usize) {
+        let corners = self.corners(face);
+        let corners = &mut self.statements.corners[corners];
+        if corners.iter().all(|&[_, _, normal]| normal != NONE) {
+            return;
+        }
+        let positions = &self.statements.positions;
+        let at = |&[p, _, _]: &Corner| positions.get(p as usize).copied().unwrap_or(Vec3::NAN);
+        self.outline.clear();
+        self.outline.extend(corners.iter().map(at));
+        let normal = polygon::normal(&self.outline).unwrap_or_default().normalize_or_zero().as_vec3();
+        let index = self.normals.len() as u32;
+        self.normals.push(normal);
+        for [_, _, missing] in corners {
+            if *missing == NONE {
+                *missing = index;
+            }
+        }
+    }
+
+    /// Appends the triangles of a face.
+    fn face(&mut self, face: usize, triangles: &mut Vec<[u32; 3]>, welder: &mut Welder) {
+        let range = self.corners(face);
+        let positions = &self.statements.positions;
+        let corners = &self.statements.corners[range];
+        self.outline.clear();
+        for &[position, _, _] in corners {
+            match positions.get(position as usize) {
+                Some(p) if p.is_finite() => self.outline.push(*p),
+                Some(_) => {
+                    return self.note(face, "a face has a coordinate that is no number and is left out");
+                }
+                None => return self.note(face, "a face names a vertex that does not exist and is left out"),
+            }
+        }
+        self.cut.clear();
+        let fit = self.triangulator.triangulate(&self.outline, &mut self.cut);
+        for triangle in &self.cut {
+            triangles.push(triangle.map(|i| welder.vertex(corners[i as usize])));
+        }
+        let empty = self.cut.is_empty();
+        match fit {
+            Fit::CrossesItself => {
+                self.note(face, "the outline of a face crosses itself; its triangles are a guess")
+            }
+            Fit::TooIntricate => self.note(face, "the outline of a face is too intricate; it is left out"),
+            Fit::Exact if empty => self.note(face, "a face without area is left out"),
+            Fit::Exact => {}
+        }
+    }
+
+    fn note(&mut self, face: usize, kind: &'static str) {
+        self.oddities.in_line(self.statements.faces[face].line.into(), kind);
+    }
+
+    fn end_run(&mut self, run: Run, first_triangle: u32, mesh: &mut Mesh) {
+        let end = mesh.triangles.len() as u32;
+        if end == first_triangle {
+            return;
+        }
+        let material = Some(self.material(run.material));
+        match mesh.primitives.last_mut() {
+            Some(last) if last.material == material => last.triangles.end = end,
+            _ => mesh.primitives.push(Primitive { triangles: first_triangle..end, material }),
+        }
+    }
+
+    fn material(&mut self, name: u32) -> u32 {
+        if let Some(&Some(found)) = self.materials.of_name.get(name as usize) {
+            return found;
+        }
+        let list = &mut self.materials.list;
+        *self.default_material.get_or_insert_with(|| {
+            list.push(Material { double_sided: true, ..Material::default() });
+            (list.len() - 1) as u32
+        })
+    }
+}
+
+/// Where a part has an attribute.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Presence {
+    Nowhere,
+    Everywhere,
+    Mixed,
+}
+
+/// Gives equal corners one vertex, without hashing: each position keeps a chain of its vertices.
+struct Welder {
+    /// For each position the last vertex made of it, or [`NONE`].
+    first: Vec<u32>,
+    vertices: Vec<Vertex>,
+}
+
+#[derive(Clone, Copy)]
+struct Vertex {
+    corner: Corner,
+    /// The next vertex of the same position, or [`NONE`].
+    next: u32,
+}
+
+/// Beyond this many vertices of one position equal ones are no longer looked for, to bound the time.
+const LONGEST_CHAIN: usize = 64;
+
+impl Welder {
+    #[inline]
+    fn vertex(&mut self, corner: Corner) -> u32 {
+        let first = &mut self.first[corner[0] as usize];
+        let mut at = *first;
+        for _ in 0..LONGEST_CHAIN {
+            let Some(vertex) = self.vertices.get(at as usize) else { break };
+            if vertex.corner == corner {
+                return at;
+            }
+            at = vertex.next;
+        }
+        let new = self.vertices.len() as u32;
+        self.vertices.push(Vertex { corner, next: *first });
+        *first = new;
+        new
+    }
+
+    /// Hands over the vertices and is ready for the next mesh.
+    fn take(&mut self) -> Vec<Vertex> {
+        for vertex in &self.vertices {
+            self.first[vertex.corner[0] as usize] = NONE;
+        }
+        std::mem::take(&mut self.vertices)
+    }
+}

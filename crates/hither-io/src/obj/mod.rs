@@ -1,0 +1,55 @@
+//! Wavefront OBJ: polygons with texture coordinates, normals, vertex colours, groups and materials.
+//!
+//! What becomes of a file:
+//! - Each combination of object (`o`) and group (`g`) that has faces becomes one mesh and one node called
+//!   `object/group`, wherever its faces are in the file; nodes are in order of first appearance. A new object
+//!   begins without a group.
+//! - Faces of any number of corners are cut into triangles; triangles without area are dropped. Vertices
+//!   are shared where position, texture coordinate and normal are the same index.
+//! - OBJ knows no sides, and many files do not care: every material is double-sided, so that nothing that
+//!   other software shows is missing.
+//! - `Kd` and vertex colours are taken as sRGB, which is what software without colour management makes of
+//!   them. `d` or `Tr` below full opacity blends. Of textures only `map_Kd` is used.
+//! - Points, lines, curves and surfaces are left out with a diagnostic. `call` is never followed.
+//! - Faces with an index out of range, or with a coordinate that is no number, are left out likewise.
+
+mod build;
+mod materials;
+mod parse;
+#[cfg(test)]
+mod tests;
+
+use crate::companions::{Companions, ModelFolder};
+use crate::oddities::Oddities;
+use crate::{Error, Loaded};
+use std::path::Path;
+
+/// Reads the OBJ file at `path`, and the material libraries and textures that it names from its folder.
+pub fn read(path: &Path) -> Result<Loaded, Error> {
+    let bytes = std::fs::read(path).map_err(|source| Error::Io {
+        path: path.to_owned(),
+        action: "cannot read",
+        source,
+    })?;
+    from_bytes(path, &bytes, &ModelFolder::of(path))
+}
+
+/// Reads an OBJ file from memory. `path` names it in messages and gives the scene its name; nothing is opened
+/// but what `companions` loads.
+pub fn from_bytes(path: &Path, bytes: &[u8], companions: &dyn Companions) -> Result<Loaded, Error> {
+    let mut oddities = Oddities::default();
+    let statements = parse::parse(bytes, &mut oddities).map_err(|parse::TooLarge| Error::Unsupported {
+        path: path.to_owned(),
+        message: "it has more than 4,294,967,293 vertices or corners; split it".into(),
+    })?;
+    let says_nothing =
+        statements.positions.is_empty() && statements.faces.is_empty() && statements.known_lines == 0;
+    if says_nothing && !oddities.is_empty() {
+        let message = "none of its lines is OBJ; is it another format, or damaged?".into();
+        return Err(Error::Malformed { path: path.to_owned(), message });
+    }
+    let materials = materials::load(&statements, companions, &mut oddities);
+    let mut scene = build::build(statements, materials, &mut oddities);
+    scene.name = path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    Loaded::checked(path, scene, oddities.into_diagnostics())
+}

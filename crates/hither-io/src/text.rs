@@ -1,0 +1,166 @@
+//! Lines, words and numbers of text formats, taken from bytes as they come: no encoding is assumed.
+
+use memchr::memchr2;
+
+/// Lines of a text, ended by LF, CR or both; the last needs no end. A line whose last byte is `\` goes on
+/// in the next one, unless it is a comment (begins with `#`), where a path may well end so.
+pub(crate) struct Lines<'a> {
+    rest: &'a [u8],
+    number: u64,
+    joined: Vec<u8>,
+}
+
+impl<'a> Lines<'a> {
+    pub(crate) fn new(bytes: &'a [u8]) -> Lines<'a> {
+        let rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        Lines { rest, number: 0, joined: Vec::new() }
+    }
+
+    /// Number of the last physical line that was taken, from 1.
+    pub(crate) fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// The next line without its end and without blanks at either side.
+    #[inline]
+    pub(crate) fn next(&mut self) -> Option<&[u8]> {
+        if self.rest.is_empty() {
+            return None;
+        }
+        let line = self.physical().trim_ascii();
+        if line.last() != Some(&b'\\') || line.first() == Some(&b'#') {
+            return Some(line);
+        }
+        Some(self.join(line))
+    }
+
+    fn physical(&mut self) -> &'a [u8] {
+        self.number += 1;
+        let Some(end) = memchr2(b'\n', b'\r', self.rest) else {
+            return std::mem::take(&mut self.rest);
+        };
+        let (line, rest) = self.rest.split_at(end);
+        self.rest = if rest.starts_with(b"\r\n") { &rest[2..] } else { &rest[1..] };
+        line
+    }
+
+    #[cold]
+    fn join(&mut self, first: &'a [u8]) -> &[u8] {
+        self.joined.clear();
+        let mut line = first;
+        loop {
+            let Some(body) = line.strip_suffix(b"\\") else {
+                self.joined.extend_from_slice(line);
+                break;
+            };
+            self.joined.extend_from_slice(body);
+            self.joined.push(b' ');
+            if self.rest.is_empty() {
+                break;
+            }
+            line = self.physical().trim_ascii();
+        }
+        self.joined.trim_ascii()
+    }
+}
+
+/// Takes the next word, up to a blank, from the front of `line`; `None` at its end or at a `#`.
+#[inline]
+pub(crate) fn word<'a>(line: &mut &'a [u8]) -> Option<&'a [u8]> {
+    let start = line.iter().position(|&b| !is_blank(b)).unwrap_or(line.len());
+    let rest = &line[start..];
+    if rest.first().is_none_or(|&b| b == b'#') {
+        *line = &[];
+        return None;
+    }
+    let end = rest.iter().position(|&b| is_blank(b)).unwrap_or(rest.len());
+    let (word, rest) = rest.split_at(end);
+    *line = rest;
+    Some(word)
+}
+
+/// Whether `byte` parts words.
+#[inline]
+pub(crate) fn is_blank(byte: u8) -> bool {
+    byte <= b' '
+}
+
+/// The number that `word` is, rounded to the nearest; a word that is none gives `None`. "nan" and "inf"
+/// are numbers here, and so may be the answer to too large an exponent.
+#[inline]
+pub(crate) fn number(word: &[u8]) -> Option<f32> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+/// `text` in quotes, on one line and not long, whatever it holds.
+pub(crate) fn quoted(text: &[u8]) -> String {
+    const LONGEST: usize = 80;
+    // Four bytes make a character at most, so this is enough of them and never much.
+    let start = &text[..text.len().min(4 * LONGEST + 4)];
+    let start = String::from_utf8_lossy(start);
+    let mut quoted = String::from("\"");
+    quoted.extend(start.chars().take(LONGEST).flat_map(char::escape_debug));
+    if start.chars().nth(LONGEST).is_some() {
+        quoted.push('…');
+    }
+    quoted.push('"');
+    quoted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(text: &str) -> Vec<(u64, String)> {
+        let mut lines = Lines::new(text.as_bytes());
+        let mut all = Vec::new();
+        while let Some(line) = lines.next() {
+            let line = String::from_utf8_lossy(line).into_owned();
+            all.push((lines.number(), line));
+        }
+        all
+    }
+
+    #[test]
+    fn every_line_end_ends_a_line_and_is_counted_once() {
+        let expected: Vec<(u64, String)> = vec![(1, "a".into()), (2, "".into()), (3, "b c".into())];
+        for text in ["a\n\nb c", "a\r\n\r\nb c\r\n", "a\r\rb c\r", "\u{feff} a \n\t\nb c  \n"] {
+            assert_eq!(lines(text), expected, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_backslash_joins_lines_but_not_in_comments() {
+        let joined = lines("f 1 \\\n 2\\\r\n3\n# C:\\\nv\n\\\nx\\");
+        let text: Vec<&str> = joined.iter().map(|(_, line)| line.as_str()).collect();
+        assert_eq!(text, ["f 1  2 3", "# C:\\", "v", "x"]);
+        assert_eq!(joined[0].0, 3);
+        assert_eq!(lines("\\"), [(1, String::new())]);
+    }
+
+    #[test]
+    fn words_end_at_blanks_and_comments() {
+        let mut line = &b" \tab  c # d"[..];
+        assert_eq!(word(&mut line), Some(&b"ab"[..]));
+        assert_eq!(word(&mut line), Some(&b"c"[..]));
+        assert_eq!(word(&mut line), None);
+        assert_eq!(word(&mut line), None);
+    }
+
+    #[test]
+    fn numbers_are_numbers() {
+        for (word, value) in [("1", 1.0), ("-.5", -0.5), ("+2.", 2.0), ("1e-3", 1e-3), ("0.1", 0.1f32)] {
+            assert_eq!(number(word.as_bytes()), Some(value));
+        }
+        assert!(number(b"nan").unwrap().is_nan() && number(b"1e99").unwrap().is_infinite());
+        for word in ["", "x", "1,5", "1.0f", "0x1", "--1", "1.#QNAN"] {
+            assert_eq!(number(word.as_bytes()), None, "{word}");
+        }
+    }
+
+    #[test]
+    fn quotes_are_short_and_plain() {
+        assert_eq!(quoted(b"a\nb\xff"), "\"a\\nb\u{fffd}\"");
+        assert!(quoted(&[b'x'; 1000]).chars().count() < 90);
+    }
+}
