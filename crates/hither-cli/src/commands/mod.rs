@@ -1,5 +1,6 @@
 //! The commands: each reads its options, lets the engine work, and says what came out.
 
+mod demo;
 mod info;
 mod render;
 mod report;
@@ -25,6 +26,6 @@ pub fn run(command: Option<Command>) -> Result<(), Failure> {
         Some(Command::Info(arguments)) => info::run(&arguments),
         Some(Command::World(arguments)) => world::run(&arguments),
         Some(Command::Render(arguments)) => render::run(&arguments),
-        None => Ok(()),
+        None => demo::run(),
     }
 }
