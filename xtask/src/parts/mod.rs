@@ -2,6 +2,7 @@
 //! install; none is left out silently. The tests' own closing lines come last.
 
 mod embree;
+mod readers;
 
 use crate::tidy;
 use anyhow::{Context, Result};
@@ -36,6 +37,7 @@ const PARTS: &[(&str, Part)] = &[
     ("tidy", |job| Ok(passed(tidy::run(job.root, false)?))),
     ("tests", |job| job.cargo_test(&["--workspace", "--no-fail-fast"])),
     ("documentation", documentation),
+    ("files read by others", readers::run),
     ("Embree agrees", embree::run),
 ];
 

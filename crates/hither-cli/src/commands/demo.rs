@@ -19,11 +19,12 @@ const FOLDER: &str = "hither-demo";
 const WORLD: &str = "world:office?n=33";
 const SIZE: (u32, u32) = (1280, 720);
 const WALK_CAMERA: &str = "walk";
-const OUTSIDE_CAMERA: &str = "outside";
+/// Cameras that stand still, and the pictures from there.
+const STANDPOINTS: [(&str, &str); 2] = [("open", "open.png"), ("outside", "outside.png")];
 /// Frames of the walk, spread over its duration.
 const FRAMES: u32 = 96;
 /// Every how many frames of the walk a picture is written.
-const PICTURE_EVERY: u32 = 24;
+const PICTURE_EVERY: u32 = 32;
 /// The frames that a plain z-buffer draws, too: the longest view, and one after the turn.
 const COMPARED: [u32; 2] = [0, 72];
 /// No further frame is drawn plainly once this has been spent on it.
@@ -120,7 +121,7 @@ impl Tour {
         Ok(walk)
     }
 
-    /// Other ways to look at one frame, and the building from outside.
+    /// Other ways to look at one frame, and the views from elsewhere.
     fn details(&mut self) -> Result<(), Failure> {
         let view = self.view_of_walk(0)?;
         let recorded = RenderOptions { complexity: true, ..RenderOptions::default() };
@@ -129,9 +130,12 @@ impl Tour {
         self.write(&frame, Shading::Depth, "depth.png")?;
         self.write(&frame, Shading::Normals, "normals.png")?;
         self.write(&frame, Shading::Complexity, "complexity.png")?;
-        let view = self.view(OUTSIDE_CAMERA)?;
-        let (frame, _) = self.draw(&view, Algorithm::Hzb)?;
-        self.write(&frame, Shading::Smooth, "outside.png")
+        for (camera, name) in STANDPOINTS {
+            let view = self.view(camera)?;
+            let (frame, _) = self.draw(&view, Algorithm::Hzb)?;
+            self.write(&frame, Shading::Smooth, name)?;
+        }
+        Ok(())
     }
 
     /// Draws a few frames both ways.
