@@ -210,6 +210,12 @@ impl Prefiltered<'_> {
 }
 
 impl Surface<'_> {
+    /// The base colour, as [`Surface::base_color`] gives it, if it is the same at every point.
+    pub fn uniform_color(&self) -> Option<Vec4> {
+        let uniform = self.colors.is_none() && self.texture.is_none();
+        uniform.then(|| self.bounded(self.base_color))
+    }
+
     /// Linear RGBA with straight alpha in [0, 1], at barycentric weights `at`, averaged over a pixel:
     /// `per_pixel` is how the weights change from one pixel to the next, in x and in y. Material × vertices
     /// × texture, prefiltered where the texture is shrunk. Alpha is 1 unless the surface is blended.
@@ -240,6 +246,10 @@ impl Surface<'_> {
                 own.truncate().extend(0.0)
             };
         }
+        self.bounded(color)
+    }
+
+    fn bounded(&self, color: Vec4) -> Vec4 {
         let finite = |c: f32| if c.is_finite() { c.max(0.0) } else { 0.0 };
         let alpha = if self.alpha_mode == AlphaMode::Blend { finite(color.w).min(1.0) } else { 1.0 };
         Vec4::new(finite(color.x), finite(color.y), finite(color.z), alpha)

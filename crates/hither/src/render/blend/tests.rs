@@ -91,21 +91,31 @@ fn panes_that_cross_are_ordered_at_each_pixel() {
 
 #[test]
 fn a_tie_in_depth_goes_to_the_smaller_instance_opaque_ones_included() {
-    let materials = || {
-        vec![
-            glass(1.0, 0.0, 0.0, 0.5),
-            glass(0.0, 1.0, 0.0, 0.5),
-            colored(Vec4::new(0.0, 0.0, 1.0, 1.0), AlphaMode::Opaque),
-        ]
-    };
-    let of = |kinds: [u32; 3]| {
+    let materials = vec![
+        glass(1.0, 0.0, 0.0, 0.5),
+        glass(0.0, 1.0, 0.0, 0.5),
+        colored(Vec4::new(0.0, 0.0, 1.0, 1.0), AlphaMode::Opaque),
+    ];
+    let lit = white();
+    for (kinds, expected) in [
+        ([0, 1, 2], Vec4::new(0.5, 0.25, 0.25, 1.0)),
+        ([1, 0, 2], Vec4::new(0.25, 0.5, 0.25, 1.0)),
+        ([0, 2, 1], Vec4::new(0.5, 0.0, 0.5, 1.0)),
+        ([2, 0, 1], Vec4::new(0.0, 0.0, 1.0, 1.0)),
+    ] {
         let parts = kinds.map(|m| (square(Some(m)), at(0.0, 0.0, 0.0))).to_vec();
-        centre(&picture(&scene(materials(), parts), &front_view())) / white()
-    };
-    assert!(close(of([0, 1, 2]), Vec4::new(0.5, 0.25, 0.25, 1.0)));
-    assert!(close(of([1, 0, 2]), Vec4::new(0.25, 0.5, 0.25, 1.0)));
-    assert!(close(of([0, 2, 1]), Vec4::new(0.5, 0.0, 0.5, 1.0)));
-    assert!(close(of([2, 0, 1]), Vec4::new(0.0, 0.0, 1.0, 1.0)));
+        let scene = scene(materials.clone(), parts);
+        let frame = frame(&scene, &front_view());
+        // Every blended square at exactly the depth of the opaque one, larger ids first.
+        let pixel = 16 * 40 + 22;
+        let fragments = |rows: Range<u32>| {
+            let glass = (0..3).rev().filter(|&i| kinds[i as usize] < 2 && rows.contains(&16));
+            let id = |instance| SurfaceId { instance, triangle: 0 };
+            glass.map(|i| Fragment { pixel, depth: frame.depth(22, 16), id: id(i) }).collect()
+        };
+        let image = Shader::new(&scene, 1).shade_with(&scene, &frame, Shading::Flat, fragments);
+        assert!(close(centre(&image) / lit, expected), "{kinds:?}: {}", centre(&image) / lit);
+    }
 }
 
 #[test]
@@ -133,7 +143,7 @@ fn back_faces_of_single_sided_glass_are_not_there() {
 fn repeated_fragments_count_once_and_bands_do_not_show() {
     let scene = scene(vec![glass(1.0, 0.5, 0.2, 0.5)], vec![(square(Some(0)), at(0.0, 0.0, 0.0))]);
     let view = View { width: 400, height: 300, ..front_view() };
-    let frame = Frame::empty(view);
+    let frame = frame(&scene, &view);
     let blended = BlendedTriangles::find(&scene, &view);
     let mut shader = Shader::new(&scene, 1);
     let once = shader.shade_with(&scene, &frame, Shading::Flat, |rows| blended.fragments(rows));

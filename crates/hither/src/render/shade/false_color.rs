@@ -5,6 +5,7 @@
 use super::{Frame, Image};
 use crate::conventions::{Projection, SurfaceId};
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 /// As many visits to a pixel are white in a picture of complexity; the scale is fixed, so that pictures of
 /// different algorithms compare.
@@ -64,21 +65,15 @@ pub(super) struct DepthRange {
 
 impl DepthRange {
     pub(super) fn of(frame: &Frame) -> DepthRange {
-        let mut range = DepthRange {
-            near: f64::INFINITY,
-            far: f64::NEG_INFINITY,
-            logarithmic: matches!(frame.view.projection, Projection::Perspective { .. }),
-        };
-        for y in 0..frame.view.height {
-            for x in 0..frame.view.width {
-                if frame.id(x, y).is_some() {
-                    let distance = frame.distance(x, y);
-                    range.near = range.near.min(distance);
-                    range.far = range.far.max(distance);
-                }
-            }
-        }
-        range
+        const NOTHING: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
+        let rows = (0..frame.view.height).into_par_iter().map(|y| {
+            let seen = (0..frame.view.width).filter(|&x| frame.id(x, y).is_some());
+            let distances = seen.map(|x| frame.distance(x, y));
+            distances.fold(NOTHING, |(near, far), d| (near.min(d), far.max(d)))
+        });
+        let (near, far) = rows.reduce(|| NOTHING, |a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let logarithmic = matches!(frame.view.projection, Projection::Perspective { .. });
+        DepthRange { near, far, logarithmic }
     }
 
     /// White at the nearest, dark grey at the farthest; a pinhole's distances by their logarithm.

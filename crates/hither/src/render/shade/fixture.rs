@@ -1,8 +1,8 @@
-//! Small scenes and their frames, found ray by ray, for the tests of shading.
+//! Small scenes and their frames, for the tests of shading.
 
-use crate::conventions::{NO_ID, Projection, SurfaceId, View};
-use crate::render::Frame;
-use crate::render::shade::{TriangleInView, depth_at, pixel_centre};
+use crate::conventions::{Projection, View};
+use crate::index::{IndexOptions, SceneIndex};
+use crate::render::{Frame, RenderOptions, render};
 use crate::scene::{AlphaMode, Content, Group, Material, Mesh, Node, Primitive, Scene, Transform};
 use glam::{DVec3, Vec3, Vec4};
 
@@ -45,32 +45,8 @@ pub(in crate::render) fn colored(color: Vec4, alpha: AlphaMode) -> Material {
     Material { base_color: color, alpha, double_sided: true, ..Material::default() }
 }
 
-/// The nearest surface at every pixel that is not blended, both sides of each solid.
+/// The frame of `scene` as the engine draws it.
 pub(in crate::render) fn frame(scene: &Scene, view: &View) -> Frame {
-    let mut frame = Frame::empty(*view);
-    let nothing = SurfaceId { instance: NO_ID, triangle: NO_ID };
-    for (i, instance) in scene.instances().iter().enumerate() {
-        let view_from_mesh = view.view_from_world * instance.world_from_mesh;
-        let mesh = &scene.meshes[instance.mesh as usize];
-        for (t, corners) in mesh.triangles.iter().enumerate() {
-            if scene.is_blended(mesh.material_of(t as u32)) {
-                continue;
-            }
-            let corners =
-                corners.map(|v| view_from_mesh.transform_point3(mesh.positions[v as usize].as_dvec3()));
-            let triangle = TriangleInView::new(view, corners);
-            let id = SurfaceId { instance: i as u32, triangle: t as u32 };
-            for pixel in 0..frame.depth.len() {
-                let (x, y) = (pixel as u32 % view.width, pixel as u32 / view.width);
-                let hit = triangle.hit(pixel_centre(x, y));
-                let depth = hit.and_then(|w| depth_at(&view.projection, triangle.distance(w)));
-                let Some(depth) = depth else { continue };
-                let nearest = (frame.depth[pixel], frame.ids[pixel]);
-                if depth > nearest.0 || (depth == nearest.0 && nearest.1 != nothing && id < nearest.1) {
-                    (frame.depth[pixel], frame.ids[pixel]) = (depth, id);
-                }
-            }
-        }
-    }
-    frame
+    let index = SceneIndex::build(scene.clone(), &IndexOptions::default());
+    render(&index, view, &RenderOptions::default()).expect("a fixture's view is valid")
 }

@@ -6,9 +6,9 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-const SKY: Vec3 = Vec3::new(0.36, 0.385, 0.42);
-const GROUND: Vec3 = Vec3::new(0.185, 0.175, 0.165);
-const KEY: Vec3 = Vec3::new(0.36, 0.35, 0.33);
+const SKY: Vec3 = Vec3::new(0.385, 0.405, 0.435);
+const GROUND: Vec3 = Vec3::new(0.245, 0.235, 0.22);
+const KEY: Vec3 = Vec3::new(0.35, 0.34, 0.32);
 const FILL: Vec3 = Vec3::new(0.085, 0.09, 0.1);
 const HEADLIGHT: f32 = 0.17;
 

@@ -18,7 +18,7 @@ pub(super) use triangle::{TriangleInView, depth_at};
 
 use super::Frame;
 use super::blend::{BlendedTriangles, Fragment, composite};
-use crate::conventions::SurfaceId;
+use crate::conventions::{NO_ID, SurfaceId};
 use crate::index::SceneIndex;
 use crate::scene::{InstanceLocator, Scene, TexturePyramids};
 use false_color::{DepthRange, id_color, normal_color};
@@ -136,10 +136,20 @@ impl Shader {
             Shading::Complexity => {
                 return complexity_image(frame, ComplexityPanel::Sum).unwrap_or_else(nothing);
             }
-            Shading::Ids => return each_pixel(frame, |_, _, id| id_color(id)),
+            Shading::Ids => {
+                return each_pixel(frame, || {
+                    let mut last = (SurfaceId { instance: NO_ID, triangle: NO_ID }, [0.0; 4]);
+                    move |_, _, id| {
+                        if last.0 != id {
+                            last = (id, id_color(id));
+                        }
+                        last.1
+                    }
+                });
+            }
             Shading::Depth => {
                 let range = DepthRange::of(frame);
-                return each_pixel(frame, |x, y, _| range.color(frame.distance(x, y)));
+                return each_pixel(frame, || |x, y, _| range.color(frame.distance(x, y)));
             }
             Shading::Flat | Shading::Smooth | Shading::Normals => {}
         }
@@ -193,13 +203,19 @@ pub(super) fn pixel_centre(x: u32, y: u32) -> DVec2 {
     DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5)
 }
 
-fn each_pixel(frame: &Frame, color: impl Fn(u32, u32, SurfaceId) -> [f32; 4] + Sync) -> Image {
+/// A picture whose every row is coloured, from left to right, by a closure of its own.
+fn each_pixel<F: FnMut(u32, u32, SurfaceId) -> [f32; 4]>(frame: &Frame, row: impl Fn() -> F + Sync) -> Image {
     let (width, height) = (frame.view.width, frame.view.height);
-    let rows = (0..height).into_par_iter().flat_map_iter(|y| {
-        let color = &color;
-        (0..width).map(move |x| frame.id(x, y).map_or([0.0; 4], |id| color(x, y, id)))
+    let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
+    pixels.par_chunks_mut(width as usize).zip(0..height).for_each(|(pixels, y)| {
+        let mut color = row();
+        for (pixel, x) in pixels.iter_mut().zip(0..) {
+            if let Some(id) = frame.id(x, y) {
+                *pixel = color(x, y, id);
+            }
+        }
     });
-    Image { width, height, pixels: rows.collect() }
+    Image { width, height, pixels }
 }
 
 fn shade_opaque(

@@ -82,6 +82,8 @@ pub(in crate::render) enum Normals {
 pub(in crate::render) struct SeenTriangle<'a> {
     in_view: TriangleInView,
     surface: Surface<'a>,
+    /// Base colour if it is the same everywhere.
+    uniform: Option<Vec4>,
     /// Unit, on the eye's side, in view space.
     face_normal: DVec3,
     /// Unit, on the eye's side of the face taken together, in view space.
@@ -105,7 +107,8 @@ impl<'a> SeenTriangle<'a> {
             Normals::Face => None,
             Normals::Vertices => vertex_normals(scene, placed, triangle, face_normal),
         };
-        SeenTriangle { in_view, surface: scene.surface(placed.mesh, triangle), face_normal, vertex_normals }
+        let surface = scene.surface(placed.mesh, triangle);
+        SeenTriangle { in_view, surface, uniform: surface.uniform_color(), face_normal, vertex_normals }
     }
 
     /// Unit normal on the eye's side, in view space, at the point seen at `at` (pixels).
@@ -127,8 +130,10 @@ impl<'a> SeenTriangle<'a> {
         pyramids: &TexturePyramids,
         light: &Light,
     ) -> Vec4 {
-        let base =
-            self.surface.base_color(self.in_view.weights(at), self.in_view.weights_per_pixel(at), pyramids);
+        let base = self.uniform.unwrap_or_else(|| {
+            let weights = self.in_view.weights(at);
+            self.surface.base_color(weights, self.in_view.weights_per_pixel(at), pyramids)
+        });
         base * light.on(self.normal(at), toward_eye(view, at)).extend(1.0)
     }
 }
