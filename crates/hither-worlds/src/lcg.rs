@@ -22,4 +22,10 @@ impl Lcg {
     pub(crate) fn below(&mut self, n: u32) -> u32 {
         ((u64::from(self.next_24_bits()) * u64::from(n)) >> 24) as u32
     }
+
+    /// A whole number below `n`, all of them in reach also where `n` exceeds 2²⁴.
+    pub(crate) fn below_wide(&mut self, n: u32) -> u32 {
+        let bits = u64::from(self.next_24_bits()) << 24 | u64::from(self.next_24_bits());
+        ((u128::from(bits) * u128::from(n)) >> 48) as u32
+    }
 }

@@ -13,7 +13,9 @@
 mod benchmark_axes;
 mod boxcity;
 mod clutter;
+mod hills;
 mod lcg;
+mod lecture;
 mod office;
 mod palette;
 mod spec;
@@ -25,7 +27,8 @@ use hither::geometry::Aabb;
 use hither::scene::Scene;
 use spec::Values;
 
-static WORLDS: &[WorldInfo] = &[office::INFO, boxcity::INFO, clutter::INFO, spheres::INFO];
+static WORLDS: &[WorldInfo] =
+    &[office::INFO, boxcity::INFO, clutter::INFO, spheres::INFO, hills::INFO, lecture::INFO];
 
 /// Generates the world that `spec` asks for, `NAME?key=value&…`. Keys left out take their defaults.
 ///

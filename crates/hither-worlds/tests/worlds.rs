@@ -154,6 +154,59 @@ fn parts_are_the_same_triangles_one_node_an_object() {
 }
 
 #[test]
+fn hills_have_the_polygons_asked_for_and_copy_none() {
+    for polygons in [1_000_000u64, 5_000_000, 53_000_000, 300_000_000] {
+        let scene = world(&format!("hills?polygons={polygons}"));
+        let found = scene.instanced_triangle_count() as f64;
+        assert!((found / polygons as f64 - 1.0).abs() < 0.05, "{polygons}: {found}");
+        let stored: usize = scene.meshes.iter().map(|m| m.triangles.len()).sum();
+        assert!(stored < 20_000 + polygons as usize / 50, "{polygons}: {stored} stored");
+    }
+}
+
+#[test]
+fn hills_follow_from_their_seed() {
+    let of = |spec: &str| {
+        let scene = world(spec);
+        let places = scene
+            .instances()
+            .into_iter()
+            .flat_map(|i| [f64::from(i.mesh)].into_iter().chain(i.world_from_mesh.to_cols_array()));
+        let places = checksum(places.map(|x| (x as f32).to_bits()));
+        (geometry_checksum(&scene), places)
+    };
+    let found = of("hills?polygons=1000000&seed=7");
+    assert_eq!(found, (0x0f54_f721_af7b_21a9, 0x8b02_f88a_5cbe_f965), "{found:#x?}");
+    assert_ne!(found, of("hills?polygons=1000000&seed=8"));
+}
+
+#[test]
+fn the_lecture_shows_its_three_examples() {
+    let scene = world("lecture");
+    assert_eq!(camera_names(&scene), ["penetrating", "cycle", "tetrahedra"]);
+    assert_eq!(scene.instance_count(), 8);
+    let seen = |camera: &str| {
+        let view = scene.find_camera(camera).and_then(|c| scene.view(c, (32, 32))).unwrap();
+        hither::reference::zbuffer::draw(&scene, &view)
+    };
+    // The rectangle is at z = 10; the triangle's corner (15, 15, 15) stands out of it, its others are behind.
+    let picture = seen("penetrating");
+    let instance = |x: u32, y: u32| picture.seen(x, 31 - y).map(|(id, _)| id.instance);
+    assert_eq!(
+        [instance(15, 15), instance(23, 22), instance(12, 10), instance(28, 12)],
+        [Some(1), Some(0), Some(0), Some(1)]
+    );
+    assert_eq!(instance(2, 2), None);
+    // Every bar and every tetrahedron is seen, each through or beside the others.
+    for (camera, instances) in [("cycle", 2..5), ("tetrahedra", 5..8)] {
+        let picture = seen(camera);
+        for i in instances {
+            assert!(picture.ids.iter().any(|id| id.instance == i), "{camera} {i}");
+        }
+    }
+}
+
+#[test]
 fn every_world_is_valid_with_its_defaults_and_unknown_ones_are_named() {
     for info in list() {
         let scene = world(info.name);
