@@ -128,7 +128,7 @@ impl Plant {
             // In the shells of seven overlapping balls.
             Plant::Broadleaf => {
                 let ball = f64::from(number % 7);
-                let middle = if number % 7 == 0 {
+                let middle = if number.is_multiple_of(7) {
                     DVec3::new(0.0, 7.6, 0.0)
                 } else {
                     let angle = ball / 6.0 * TAU;
