@@ -14,9 +14,11 @@ pub(crate) enum Format {
     Gltf,
     /// Wavefront OBJ.
     Obj,
+    /// STL, as text or binary.
+    Stl,
 }
 
-const KNOWN: &str = ".glb, .gltf or .obj";
+const KNOWN: &str = ".glb, .gltf, .obj or .stl";
 
 /// The format of the file at `path`.
 pub(crate) fn recognise(path: &Path) -> Result<Format, Error> {
@@ -56,6 +58,7 @@ fn by_extension(extension: &str) -> Option<Format> {
     match extension {
         "glb" | "gltf" => Some(Format::Gltf),
         "obj" => Some(Format::Obj),
+        "stl" => Some(Format::Stl),
         _ => None,
     }
 }

@@ -16,9 +16,11 @@ mod oddities;
 mod png;
 mod polygon;
 mod srgb;
+pub mod stl;
 mod text;
 #[allow(dead_code)] // its users follow
 mod texture;
+mod weld;
 
 pub use atomic::{check_writable, write_whole};
 pub use companions::{Companions, ModelFolder};
@@ -37,5 +39,6 @@ pub fn read(path: &Path) -> Result<Loaded, Error> {
     match format::recognise(path)? {
         Format::Gltf => gltf::read(path),
         Format::Obj => obj::read(path),
+        Format::Stl => stl::read(path),
     }
 }

@@ -2,18 +2,25 @@
 
 use memchr::memchr2;
 
-/// Lines of a text, ended by LF, CR or both; the last needs no end. A line whose last byte is `\` goes on
-/// in the next one, unless it is a comment (begins with `#`), where a path may well end so.
+/// Lines of a text, ended by LF, CR or both; the last needs no end.
 pub(crate) struct Lines<'a> {
     rest: &'a [u8],
     number: u64,
+    continues: bool,
     joined: Vec<u8>,
 }
 
 impl<'a> Lines<'a> {
-    pub(crate) fn new(bytes: &'a [u8]) -> Lines<'a> {
+    /// The lines of `bytes`, without the mark of UTF-8 at their beginning.
+    pub(crate) fn plain(bytes: &'a [u8]) -> Lines<'a> {
         let rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        Lines { rest, number: 0, joined: Vec::new() }
+        Lines { rest, number: 0, continues: false, joined: Vec::new() }
+    }
+
+    /// As [`Lines::plain`], but a line whose last byte is `\` goes on in the next one, unless it is a comment
+    /// (begins with `#`), where a path may well end so.
+    pub(crate) fn continued(bytes: &'a [u8]) -> Lines<'a> {
+        Lines { continues: true, ..Lines::plain(bytes) }
     }
 
     /// Number of the last physical line that was taken, from 1.
@@ -28,7 +35,7 @@ impl<'a> Lines<'a> {
             return None;
         }
         let line = self.physical().trim_ascii();
-        if line.last() != Some(&b'\\') || line.first() == Some(&b'#') {
+        if !self.continues || line.last() != Some(&b'\\') || line.first() == Some(&b'#') {
             return Some(line);
         }
         Some(self.join(line))
@@ -154,7 +161,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn lines(text: &str) -> Vec<(u64, String)> {
-        let mut lines = Lines::new(text.as_bytes());
+        let mut lines = Lines::continued(text.as_bytes());
         let mut all = Vec::new();
         while let Some(line) = lines.next() {
             let line = String::from_utf8_lossy(line).into_owned();
@@ -178,6 +185,7 @@ mod tests {
         assert_eq!(text, ["f 1  2 3", "# C:\\", "v", "x"]);
         assert_eq!(joined[0].0, 3);
         assert_eq!(lines("\\"), [(1, String::new())]);
+        assert_eq!(Lines::plain(b"a\\\nb").next(), Some(&b"a\\"[..]));
     }
 
     #[test]

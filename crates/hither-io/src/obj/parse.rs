@@ -89,7 +89,7 @@ pub(super) fn parse(bytes: &[u8], oddities: &mut Oddities) -> Result<Statements,
         part_of_name: HashMap::new(),
         material_of_name: HashMap::new(),
     };
-    let mut lines = Lines::new(bytes);
+    let mut lines = Lines::continued(bytes);
     // `number()` borrows what the line borrows.
     let mut number = 0;
     while let Some(line) = lines.next() {

@@ -1,0 +1,106 @@
+//! STL as text: solids of facets of loops of vertices. Lenient: only what says where corners are matters.
+
+use super::Solid;
+use crate::oddities::Oddities;
+use crate::polygon::{Fit, Triangulator};
+use crate::text::{self, Lines, quoted};
+use glam::Vec3;
+use hither::scene::Scene;
+
+/// Appends a part for each solid; on failure a line that says why.
+pub(super) fn read(bytes: &[u8], scene: &mut Scene, oddities: &mut Oddities) -> Result<(), String> {
+    let mut reader = Reader::default();
+    let mut lines = Lines::plain(bytes);
+    let mut number = 0;
+    while let Some(line) = lines.next() {
+        number += 1;
+        let mut rest = line;
+        let Some(word) = text::word(&mut rest) else { continue };
+        let is = |name: &str| word.eq_ignore_ascii_case(name.as_bytes());
+        if is("vertex") {
+            reader.vertex(rest);
+        } else if is("facet") || is("endfacet") || is("outer") || is("endloop") {
+            reader.facets += u64::from(is("facet"));
+            reader.close_loop(number, oddities);
+        } else if is("solid") {
+            reader.end_solid(scene);
+            reader.solid.name = String::from_utf8_lossy(rest.trim_ascii()).into_owned();
+            reader.is_open = true;
+        } else if is("endsolid") {
+            reader.close_loop(number, oddities);
+            reader.end_solid(scene);
+        } else {
+            oddities.note(
+                "unknown",
+                || format!("line {number}"),
+                || format!("{} is not a word of the format; the line is left out", quoted(word)),
+            );
+        }
+    }
+    if reader.facets == 0 && (reader.is_open || !oddities.is_empty()) {
+        return Err("it begins with \"solid\" but holds no facet; is it damaged, or another format?".into());
+    }
+    if reader.is_open {
+        let message = || "the file ends within a solid; what was complete is read".to_owned();
+        oddities.note("end", || format!("line {number}"), message);
+    }
+    reader.end_solid(scene);
+    Ok(())
+}
+
+#[derive(Default)]
+struct Reader {
+    solid: Solid,
+    is_open: bool,
+    facets: u64,
+    /// Corners since the last loop began.
+    outline: Vec<Vec3>,
+    triangulator: Triangulator,
+    cut: Vec<[u32; 3]>,
+}
+
+impl Reader {
+    fn vertex(&mut self, mut line: &[u8]) {
+        let mut position = Vec3::NAN;
+        for axis in 0..3 {
+            let Some(value) = text::word(&mut line).and_then(text::number) else { break };
+            position[axis] = value;
+        }
+        self.outline.push(position);
+    }
+
+    /// Makes triangles of the corners that were given, if any.
+    fn close_loop(&mut self, number: u64, oddities: &mut Oddities) {
+        match self.outline[..] {
+            [] => return,
+            [_] | [_, _] => {
+                oddities.in_line(number, "a loop has fewer than three corners and is left out");
+            }
+            [a, b, c] => self.solid.triangle([a, b, c], || format!("line {number}"), oddities),
+            _ => self.polygon(number, oddities),
+        }
+        self.outline.clear();
+    }
+
+    /// The format knows triangles alone, but some software writes more corners.
+    fn polygon(&mut self, number: u64, oddities: &mut Oddities) {
+        if !self.outline.iter().all(|p| p.is_finite()) {
+            oddities.in_line(number, "a loop has a coordinate that is no number and is left out");
+            return;
+        }
+        self.cut.clear();
+        if self.triangulator.triangulate(&self.outline, &mut self.cut) != Fit::Exact {
+            oddities.in_line(number, "a loop crosses itself or is too intricate; its triangles are a guess");
+        }
+        for triangle in &self.cut {
+            let corners = triangle.map(|i| self.outline[i as usize]);
+            self.solid.triangle(corners, || format!("line {number}"), oddities);
+        }
+    }
+
+    fn end_solid(&mut self, scene: &mut Scene) {
+        self.outline.clear();
+        self.is_open = false;
+        std::mem::take(&mut self.solid).finish(scene);
+    }
+}
