@@ -41,3 +41,21 @@ pub fn of_panic(panic: &PanicHookInfo) -> String {
     let place = panic.location().map(|l| format!(" at {}:{}", l.file(), l.line())).unwrap_or_default();
     format!("internal error{place}: {said}; this is a bug in hither, please report it with the command line")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    #[test]
+    fn a_panic_is_one_line() {
+        static SAID: Mutex<String> = Mutex::new(String::new());
+        std::panic::set_hook(Box::new(|panic| *SAID.lock().unwrap() = of_panic(panic)));
+        let result = std::panic::catch_unwind(|| panic!("first\nsecond {}", 3));
+        drop(std::panic::take_hook());
+        assert!(result.is_err());
+        let said = SAID.lock().unwrap().clone();
+        assert!(said.contains("failure.rs:") && said.contains(": first second 3; "), "{said}");
+        assert!(!said.contains('\n'));
+    }
+}

@@ -77,8 +77,9 @@ pub struct ViewOptions {
 #[derive(Args, Debug)]
 pub struct WorkOptions {
     /// Worker threads; 0 is one for each core
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Work")]
-    pub threads: usize,
+    #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u16).range(..=1024),
+          help_heading = "Work")]
+    pub threads: u16,
     /// How visibility is found
     #[arg(long, value_name = "NAME", default_value = "hzb", help_heading = "Work")]
     pub algorithm: AlgorithmName,
@@ -99,7 +100,7 @@ impl WorkOptions {
         };
         RenderOptions {
             algorithm,
-            threads: self.threads,
+            threads: usize::from(self.threads),
             coherence: self.coherence,
             complexity,
             ..RenderOptions::default()

@@ -4,15 +4,28 @@ use crate::console::Verbosity;
 use crate::failure::Failure;
 use crate::options::ViewOptions;
 use hither::{Scene, SceneIndex};
+use std::ops::Range;
 
 /// Pictures to make, in order; at least one.
 #[derive(Clone, Debug)]
 pub struct Timeline {
-    /// Number and time of each, seconds; `None`: as the scene is stored.
-    pub frames: Vec<(u32, Option<f64>)>,
+    /// Their numbers.
+    pub frames: Range<u32>,
     /// Whether their numbers go into file names.
     pub numbered: bool,
+    clock: Clock,
     animation: Option<usize>,
+}
+
+/// When a picture is.
+#[derive(Clone, Copy, Debug)]
+enum Clock {
+    /// The scene stays as it is stored.
+    Stopped,
+    /// At this time, seconds.
+    At(f64),
+    /// At the picture's number divided by this rate, pictures a second.
+    Rate(f64),
 }
 
 impl Timeline {
@@ -23,34 +36,44 @@ impl Timeline {
         options: &ViewOptions,
         verbosity: Verbosity,
     ) -> Result<Timeline, Failure> {
-        let moves = options.time.is_some() || options.frames.is_some();
         let animation = match &options.animation {
             Some(name) => Some(find(scene, source, name)?),
             None => (!scene.animations.is_empty()).then_some(0),
         };
-        if moves && animation.is_none() {
+        let clock = match (&options.frames, options.time, &options.animation) {
+            (Some(_), ..) => Clock::Rate(options.fps),
+            (None, Some(time), _) => Clock::At(time),
+            // An animation that is asked for by name shows its beginning.
+            (None, None, Some(_)) => Clock::At(0.0),
+            (None, None, None) => Clock::Stopped,
+        };
+        if animation.is_none() && !matches!(clock, Clock::Stopped) {
             verbosity.warning(&format!("{source}: the scene has no animation; it stands still"));
         }
-        let frames = match &options.frames {
-            Some(range) => range.clone().map(|f| (f, Some(f64::from(f) / options.fps))).collect(),
-            // An animation that is asked for by name shows its beginning.
-            None if options.animation.is_some() => vec![(0, Some(options.time.unwrap_or(0.0)))],
-            None => vec![(0, options.time)],
-        };
-        Ok(Timeline { frames, numbered: options.frames.is_some(), animation })
+        let numbered = options.frames.is_some();
+        Ok(Timeline { frames: options.frames.clone().unwrap_or(0..1), numbered, clock, animation })
     }
 
-    /// Poses an index for one of the frames.
-    pub fn pose(&self, index: &mut SceneIndex, time: Option<f64>) {
-        if let (Some(animation), Some(time)) = (self.animation, time) {
+    /// Time of picture `frame` in the scene's animation, seconds; `None`: as the scene is stored.
+    pub fn time(&self, frame: u32) -> Option<f64> {
+        match self.clock {
+            Clock::Stopped => None,
+            Clock::At(time) => Some(time),
+            Clock::Rate(rate) => Some(f64::from(frame) / rate),
+        }
+    }
+
+    /// Poses an index for one of the pictures.
+    pub fn pose(&self, index: &mut SceneIndex, frame: u32) {
+        if let (Some(animation), Some(time)) = (self.animation, self.time(frame)) {
             index.pose(animation, time);
         }
     }
 
-    /// Poses a scene that is not indexed yet for the first frame.
+    /// Poses a scene that is not indexed yet for the first picture.
     pub fn pose_first(&self, scene: &mut Scene) {
-        if let (Some(animation), Some((_, Some(time)))) = (self.animation, self.frames.first()) {
-            scene.pose(animation, *time);
+        if let (Some(animation), Some(time)) = (self.animation, self.time(self.frames.start)) {
+            scene.pose(animation, time);
         }
     }
 }

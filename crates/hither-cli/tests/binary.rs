@@ -88,6 +88,7 @@ fn a_wrong_command_line_is_code_2() {
     refused(&["render", WORLD, "-o", "x.png", "--frames", "4..4"], 2, &["0..250"]);
     refused(&["render", WORLD, "-o", "x.png", "--frames", "0..4", "--time", "1"], 2, &["--time", "--frames"]);
     refused(&["render", WORLD, "-o", "x.png", "--algorithm", "magic"], 2, &["magic", "zbuffer"]);
+    refused(&["render", WORLD, "-o", "x.png", "--threads", "100000"], 2, &["100000", "--threads"]);
     refused(&["render", WORLD, "-o", "x.png", "-q", "-v"], 2, &["--quiet", "--verbose"]);
     refused(&["info"], 2, &["SCENE"]);
     refused(&["world", "office"], 2, &["-o"]);
@@ -181,6 +182,63 @@ fn a_report_on_standard_output_is_nothing_but_json() {
     assert_eq!(report["schema"], "hither.info/1");
     assert_eq!(report["cameras"][0]["name"], "corridor");
     assert!(report["bounds"]["max"][0].as_f64().unwrap() > 0.0);
+}
+
+/// A red wall with a hole that a camera-less view looks at, and oddities that are worth a warning each.
+const OBJ: &str = "\
+mtllib nowhere.mtl
+v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0
+usemtl red
+f 1 2 3 4
+f 4 3 2 1
+";
+
+#[test]
+fn what_is_odd_about_a_file_is_a_warning_and_its_picture_is_made() {
+    let folder = Folder::new("odd");
+    fs::write(folder.0.join("wall.obj"), OBJ).unwrap();
+    let (wall, picture) = (folder.path("wall.obj"), folder.path("wall.png"));
+    let output = done(&["render", &wall, "-o", &picture, "--size", "32x32", "--json", "-"]);
+    let text = stderr(&output);
+    assert!(text.lines().any(|l| l.starts_with("warning: ") && l.contains("nowhere.mtl")), "{text}");
+    assert!(text.contains("note: the scene has no camera"), "{text}");
+    let mut lines: Vec<&str> = text.lines().collect();
+    let all = lines.len();
+    lines.sort_unstable();
+    lines.dedup();
+    assert_eq!(lines.len(), all, "said twice: {text}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let frame = &report["frames"][0];
+    assert_eq!(frame["file"], picture);
+    assert!(frame["pixels_covered"].as_u64().unwrap() > 100, "{frame}");
+}
+
+#[test]
+fn the_picture_does_not_depend_on_how_the_work_is_done() {
+    let folder = Folder::new("same");
+    let picture = |name: &str, options: &[&str]| {
+        let path = folder.path(name);
+        let common = ["render", "world:office?n=3", "--camera", "open", "--size", "96x54", "-o", &path];
+        done(&[&common, options].concat());
+        fs::read(&path).unwrap()
+    };
+    for shade in ["smooth", "ids", "depth"] {
+        let plain = picture("plain.png", &["--shade", shade, "--algorithm", "zbuffer", "--threads", "1"]);
+        assert!(plain == picture("hzb.png", &["--shade", shade]), "{shade}: hzb");
+        assert!(plain == picture("two.png", &["--shade", shade, "--threads", "2"]), "{shade}: two threads");
+        for tree in ["bvh", "octree", "octree-pushed"] {
+            assert!(plain == picture("tree.png", &["--shade", shade, "--tree", tree]), "{shade}: {tree}");
+        }
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_one_line_and_code_1() {
+    let folder = Folder::new("full");
+    std::os::unix::fs::symlink("/dev/full", folder.0.join("full.png")).unwrap();
+    refused(&["render", WORLD, "-o", &folder.path("full.png"), "--size", "64x64"], 1, &["full.png", "space"]);
+    refused(&["info", WORLD, "--json", "/dev/full"], 1, &["/dev/full", "space"]);
 }
 
 #[test]

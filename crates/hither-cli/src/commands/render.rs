@@ -83,7 +83,8 @@ fn check_outputs(arguments: &Arguments) -> Result<(), Failure> {
         match &arguments.view.frames {
             None => hither_io::check_writable(output)?,
             Some(frames) => {
-                for frame in frames.clone() {
+                // The folder is the same for all; a thousand names show most other obstacles.
+                for frame in frames.clone().take(1000) {
                     hither_io::check_writable(&outputs::numbered(output, frame))?;
                 }
             }
@@ -111,8 +112,8 @@ impl Job<'_> {
         let mut shader = Shader::new(index.scene(), options.threads);
         let mut reports = Vec::new();
         let bar = verbosity.bar(self.timeline.frames.len() as u64, "pictures");
-        for &(number, time) in &self.timeline.frames {
-            self.timeline.pose(index, time);
+        for number in self.timeline.frames.clone() {
+            self.timeline.pose(index, number);
             let view = self.eye.view(index.scene(), self.arguments.view.size);
             let start = Instant::now();
             let frame = renderer.render(index, &view, &options).map_err(|e| Failure::work(e.to_string()))?;
@@ -126,13 +127,15 @@ impl Job<'_> {
                 }
             });
             bar.inc(1);
-            reports.push(frame_json(&frame, &seen, number, time, render_time, file.as_deref()));
+            if self.arguments.report.json.is_some() {
+                let time = self.timeline.time(number);
+                reports.push(frame_json(&frame, &seen, number, time, render_time, file.as_deref()));
+            }
             renderer.recycle(frame);
         }
         bar.finish_and_clear();
         if let (Some(output), true) = (&self.arguments.output, self.timeline.numbered) {
-            let last = &self.timeline.frames[self.timeline.frames.len() - 1];
-            let (first, last) = (self.timeline.frames[0].0, last.0);
+            let (first, last) = (self.timeline.frames.start, self.timeline.frames.end - 1);
             let name = |frame| outputs::numbered(output, frame).display().to_string();
             verbosity.note(&format!("wrote {} to {}", name(first), name(last)));
         }
