@@ -14,11 +14,13 @@ pub(crate) enum Format {
     Gltf,
     /// Wavefront OBJ.
     Obj,
+    /// PLY, as text or binary.
+    Ply,
     /// STL, as text or binary.
     Stl,
 }
 
-const KNOWN: &str = ".glb, .gltf, .obj or .stl";
+const KNOWN: &str = ".glb, .gltf, .obj, .ply or .stl";
 
 /// The format of the file at `path`.
 pub(crate) fn recognise(path: &Path) -> Result<Format, Error> {
@@ -51,6 +53,9 @@ fn by_content(start: &[u8]) -> Option<Format> {
     if start.starts_with(b"glTF") {
         return Some(Format::Gltf);
     }
+    if start.starts_with(b"ply\n") || start.starts_with(b"ply\r") {
+        return Some(Format::Ply);
+    }
     None
 }
 
@@ -58,6 +63,7 @@ fn by_extension(extension: &str) -> Option<Format> {
     match extension {
         "glb" | "gltf" => Some(Format::Gltf),
         "obj" => Some(Format::Obj),
+        "ply" => Some(Format::Ply),
         "stl" => Some(Format::Stl),
         _ => None,
     }
@@ -70,6 +76,8 @@ mod tests {
     #[test]
     fn content_wins_over_extension() {
         assert_eq!(by_content(b"glTF\x02\0\0\0"), Some(Format::Gltf));
+        assert_eq!(by_content(b"ply\r\nformat"), Some(Format::Ply));
+        assert_eq!(by_content(b"plywood"), None);
         assert_eq!(by_content(b"{}"), None);
         assert_eq!(by_extension("glb"), Some(Format::Gltf));
         assert_eq!(by_extension("docx"), None);

@@ -13,6 +13,7 @@ mod format;
 mod gltf;
 pub mod obj;
 mod oddities;
+pub mod ply;
 mod png;
 mod polygon;
 mod srgb;
@@ -39,6 +40,7 @@ pub fn read(path: &Path) -> Result<Loaded, Error> {
     match format::recognise(path)? {
         Format::Gltf => gltf::read(path),
         Format::Obj => obj::read(path),
+        Format::Ply => ply::read(path),
         Format::Stl => stl::read(path),
     }
 }
