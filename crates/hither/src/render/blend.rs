@@ -6,13 +6,13 @@
 
 use super::Frame;
 use super::shade::{
-    Image, Light, Normals, Placed, PlacedInstances, SeenTriangle, TriangleInView, depth_at, instances_among,
+    Image, Placed, PlacedInstances, Rays, SeenTriangle, Setting, TriangleInView, depth_at, instances_among,
     pixel_centre,
 };
 use crate::conventions::{Projection, SurfaceId, View};
 use crate::geometry::Aabb;
-use crate::scene::{Content, Group, InstanceLocator, Mesh, Scene, TexturePyramids};
-use glam::{DAffine3, DVec3, Vec4};
+use crate::scene::{Content, Group, InstanceLocator, Mesh, Scene};
+use glam::{DAffine3, DVec2, DVec3, Vec4};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -44,20 +44,17 @@ struct Shaded {
     color: Vec4,
 }
 
-/// Composites the blended surfaces of `scene` over `image`, the shaded picture of `frame`.
+/// Composites the blended surfaces of a scene over `image`, the shaded picture of `frame`.
 ///
-/// `fragments(rows)` is as [`Shader::shade_with`](super::Shader::shade_with) demands. The pyramids must be
-/// prepared for every blended material.
+/// `fragments(rows)` is as [`Shader::shade_with`](super::Shader::shade_with) demands.
 pub(super) fn composite(
     image: &mut Image,
-    scene: &Scene,
+    setting: &Setting,
     frame: &Frame,
-    normals: Normals,
-    (locator, pyramids): (&InstanceLocator, &TexturePyramids),
+    locator: &InstanceLocator,
     fragments: &(impl Fn(Range<u32>) -> Vec<Fragment> + Sync),
 ) {
     let view = &frame.view;
-    let light = Light::new(view.view_from_world.matrix3);
     let width = view.width as usize;
     let rows = (BAND_PIXELS / width).max(1);
     image.pixels.par_chunks_mut(rows * width).enumerate().for_each(|(band, pixels)| {
@@ -68,10 +65,9 @@ pub(super) fn composite(
             return;
         }
         let numbers = instances_among(found.iter().map(|f| f.id));
-        let instances = PlacedInstances::look_up(numbers, scene, locator, view);
-        let mut shaded = shade_fragments(found, scene, view, normals, &instances, |seen, fragment| {
-            let at = pixel_centre(fragment.pixel % view.width, fragment.pixel / view.width);
-            seen.color(view, at, pyramids, &light)
+        let instances = PlacedInstances::look_up(numbers, setting.scene, locator, view);
+        let mut shaded = shade_fragments(found, setting, &instances, |f| {
+            pixel_centre(f.pixel % view.width, f.pixel / view.width)
         });
         shaded.sort_unstable_by(|a, b| {
             let (a, b) = (&a.fragment, &b.fragment);
@@ -86,19 +82,17 @@ pub(super) fn composite(
 }
 
 /// Fragments of one triangle usually come together, so that it is set up once.
-fn shade_fragments<'a>(
+fn shade_fragments(
     fragments: Vec<Fragment>,
-    scene: &'a Scene,
-    view: &View,
-    normals: Normals,
+    setting: &Setting,
     instances: &PlacedInstances,
-    color: impl Fn(&SeenTriangle<'a>, &Fragment) -> Vec4,
+    centre: impl Fn(&Fragment) -> DVec2,
 ) -> Vec<Shaded> {
     let mut shaded = Vec::with_capacity(fragments.len());
     for same in fragments.chunk_by(|a, b| a.id == b.id) {
         let id = same[0].id;
-        let seen = SeenTriangle::new(scene, instances.get(id.instance), id.triangle, view, normals);
-        let colored = same.iter().map(|f| Shaded { fragment: *f, color: color(&seen, f) });
+        let seen = SeenTriangle::new(setting, instances.get(id.instance), id.triangle);
+        let colored = same.iter().map(|f| Shaded { fragment: *f, color: seen.color(setting, centre(f)) });
         shaded.extend(colored.filter(|s| s.color.w > 0.0));
     }
     shaded
@@ -121,6 +115,7 @@ fn over(layers: impl Iterator<Item = Vec4>, ground: Vec4) -> Vec4 {
 pub struct BlendedTriangles<'a> {
     scene: &'a Scene,
     view: View,
+    rays: Rays,
     instances: Vec<Placed>,
     /// Ascending by first row.
     triangles: Vec<BlendedTriangle>,
@@ -147,7 +142,13 @@ impl<'a> BlendedTriangles<'a> {
     /// Finds them. Cost: the stored nodes, the expanded nodes that lead to blended surfaces in the view, and
     /// the triangles there.
     pub fn find(scene: &'a Scene, view: &View) -> BlendedTriangles<'a> {
-        let mut found = BlendedTriangles { scene, view: *view, instances: Vec::new(), triangles: Vec::new() };
+        let mut found = BlendedTriangles {
+            scene,
+            view: *view,
+            rays: Rays::new(view),
+            instances: Vec::new(),
+            triangles: Vec::new(),
+        };
         let meshes: Vec<Aabb> = scene.meshes.iter().map(|m| blended_bounds(scene, m)).collect();
         if meshes.iter().all(Aabb::is_empty) {
             return found;
@@ -201,7 +202,7 @@ impl<'a> BlendedTriangles<'a> {
             let double_sided = self.scene.materials[material as usize].double_sided;
             for triangle in primitive.triangles.clone() {
                 let corners = placed.corners(self.scene, triangle);
-                let turned = TriangleInView::new(&self.view, corners).orientation;
+                let turned = TriangleInView::new(&self.rays, corners).orientation;
                 let is_front = if mirrored { turned < 0.0 } else { turned > 0.0 };
                 if turned == 0.0 || !(is_front || double_sided) {
                     continue;
@@ -225,7 +226,7 @@ impl<'a> BlendedTriangles<'a> {
         let begun = self.triangles.partition_point(|t| t.first_row < rows.end);
         for t in self.triangles[..begun].iter().filter(|t| t.end_row > rows.start) {
             let corners = self.instances[t.placed as usize].corners(self.scene, t.id.triangle);
-            let in_view = TriangleInView::new(&self.view, corners);
+            let in_view = TriangleInView::new(&self.rays, corners);
             for y in t.first_row.max(rows.start)..t.end_row.min(rows.end) {
                 for x in in_view.columns(y, self.view.width) {
                     let depth = in_view

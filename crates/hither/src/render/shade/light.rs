@@ -6,18 +6,18 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-const SKY: Vec3 = Vec3::new(0.385, 0.405, 0.435);
-const GROUND: Vec3 = Vec3::new(0.245, 0.235, 0.22);
-const KEY: Vec3 = Vec3::new(0.35, 0.34, 0.32);
-const FILL: Vec3 = Vec3::new(0.085, 0.09, 0.1);
+const SKY: Vec3 = Vec3::new(0.265, 0.28, 0.305);
+const GROUND: Vec3 = Vec3::new(0.18, 0.17, 0.16);
+const KEY: Vec3 = Vec3::new(0.47, 0.46, 0.44);
+const FILL: Vec3 = Vec3::new(0.12, 0.13, 0.145);
 const HEADLIGHT: f32 = 0.17;
 
 /// Towards the lamps, in world space, not normalised.
 const KEY_DIRECTION: DVec3 = DVec3::new(0.6, 0.7, 0.3);
-const FILL_DIRECTION: DVec3 = DVec3::new(-0.5, 0.25, -0.8);
+const FILL_DIRECTION: DVec3 = DVec3::new(-0.25, 0.2, -0.9);
 
 /// How far a lamp reaches around a form: 0 stops where the surface turns away, 1 goes all around.
-const KEY_WRAP: f32 = 0.35;
+const KEY_WRAP: f32 = 0.25;
 
 /// The lights as seen from one eye.
 #[derive(Clone, Copy, Debug)]
@@ -37,14 +37,18 @@ impl Light {
         }
     }
 
-    /// Light leaving a white surface with unit `normal` towards `toward_eye`, both in view space.
-    pub(in crate::render) fn on(&self, normal: DVec3, toward_eye: DVec3) -> Vec3 {
+    /// Light that leaves a white surface with unit `normal` in view space, the headlight's apart.
+    pub(in crate::render) fn around(&self, normal: DVec3) -> Vec3 {
         let facing = |direction: DVec3| normal.dot(direction) as f32;
         let key = ((facing(self.key) + KEY_WRAP) / (1.0 + KEY_WRAP)).clamp(0.0, 1.0);
         GROUND.lerp(SKY, (facing(self.up) * 0.5 + 0.5).clamp(0.0, 1.0))
             + KEY * (key * key)
             + FILL * facing(self.fill).clamp(0.0, 1.0)
-            + Vec3::splat(HEADLIGHT * facing(toward_eye).clamp(0.0, 1.0))
+    }
+
+    /// The headlight's share, for a surface that is seen from `toward_eye`, unit, in view space.
+    pub(in crate::render) fn ahead(&self, normal: DVec3, toward_eye: DVec3) -> Vec3 {
+        Vec3::splat(HEADLIGHT * (normal.dot(toward_eye) as f32).clamp(0.0, 1.0))
     }
 }
 
@@ -60,7 +64,7 @@ mod tests {
             for j in 0..40 {
                 let (a, b) = (f64::from(i) * 0.08, f64::from(j) * 0.16);
                 let normal = DVec3::new(a.sin() * b.cos(), a.cos(), a.sin() * b.sin());
-                let white = light.on(normal, normal);
+                let white = light.around(normal) + light.ahead(normal, normal);
                 dark_to_bright.start = dark_to_bright.start.min(white.min_element());
                 dark_to_bright.end = dark_to_bright.end.max(white.max_element());
             }
@@ -68,7 +72,7 @@ mod tests {
         assert!(dark_to_bright.start > 0.1 && dark_to_bright.end <= 1.0, "{dark_to_bright:?}");
         // Seen from a corner, where the headlight tells nothing apart.
         let corner = DVec3::ONE.normalize();
-        let leaving = |n: DVec3| light.on(n, corner * n.dot(corner).signum());
+        let leaving = |n: DVec3| light.around(n) + light.ahead(n, corner * n.dot(corner).signum());
         let sides = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
         for (i, a) in sides.iter().enumerate() {
             for b in sides[..i].iter().filter(|b| a.dot(**b) == 0.0) {

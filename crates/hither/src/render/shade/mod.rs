@@ -13,8 +13,8 @@ mod triangle;
 
 pub use false_color::{COMPLEXITY_WHITE, ComplexityPanel, complexity_image, complexity_panels};
 pub(super) use light::Light;
-pub(super) use surface::{Normals, Placed, PlacedInstances, SeenTriangle, instances_among};
-pub(super) use triangle::{TriangleInView, depth_at};
+pub(super) use surface::{Normals, Placed, PlacedInstances, SeenTriangle, Setting, instances_among};
+pub(super) use triangle::{Rays, TriangleInView, depth_at};
 
 use super::Frame;
 use super::blend::{BlendedTriangles, Fragment, composite};
@@ -155,17 +155,19 @@ impl Shader {
         }
         let instances = self.instances_in(scene, frame);
         self.prepare_textures(scene, instances.meshes());
-        let mut image = shade_opaque(scene, frame, shading, &instances, &self.pyramids);
         if shading.shows_blended() {
             self.prepare_blended_textures(scene);
-            composite(
-                &mut image,
-                scene,
-                frame,
-                shading.normals(),
-                (&self.locator, &self.pyramids),
-                fragments,
-            );
+        }
+        let setting = Setting {
+            scene,
+            rays: Rays::new(&frame.view),
+            light: Light::new(frame.view.view_from_world.matrix3),
+            normals: shading.normals(),
+            pyramids: &self.pyramids,
+        };
+        let mut image = shade_opaque(&setting, frame, shading, &instances);
+        if shading.shows_blended() {
+            composite(&mut image, &setting, frame, &self.locator, fragments);
         }
         image
     }
@@ -218,35 +220,26 @@ fn each_pixel<F: FnMut(u32, u32, SurfaceId) -> [f32; 4]>(frame: &Frame, row: imp
     Image { width, height, pixels }
 }
 
-fn shade_opaque(
-    scene: &Scene,
-    frame: &Frame,
-    shading: Shading,
-    instances: &PlacedInstances,
-    pyramids: &TexturePyramids,
-) -> Image {
-    let view = &frame.view;
-    let light = Light::new(view.view_from_world.matrix3);
-    let world_from_view = view.view_from_world.matrix3.transpose();
-    let (width, height) = (view.width, view.height);
+fn shade_opaque(setting: &Setting, frame: &Frame, shading: Shading, instances: &PlacedInstances) -> Image {
+    let world_from_view = frame.view.view_from_world.matrix3.transpose();
+    let (width, height) = (frame.view.width, frame.view.height);
     let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
-    pixels.par_chunks_mut(width as usize).enumerate().for_each(|(y, row)| {
+    pixels.par_chunks_mut(width as usize).zip(0..height).for_each(|(row, y)| {
         let mut last: Option<(SurfaceId, SeenTriangle)> = None;
-        for (x, pixel) in row.iter_mut().enumerate() {
-            let Some(id) = frame.id(x as u32, y as u32) else { continue };
+        for (pixel, x) in row.iter_mut().zip(0..) {
+            let Some(id) = frame.id(x, y) else { continue };
             let (_, seen) = match last.take() {
                 Some(same) if same.0 == id => last.insert(same),
                 _ => {
                     let placed = instances.get(id.instance);
-                    let seen = SeenTriangle::new(scene, placed, id.triangle, view, shading.normals());
-                    last.insert((id, seen))
+                    last.insert((id, SeenTriangle::new(setting, placed, id.triangle)))
                 }
             };
-            let at = pixel_centre(x as u32, y as u32);
+            let at = pixel_centre(x, y);
             *pixel = match shading {
                 Shading::Normals => normal_color(world_from_view * seen.normal(at)),
                 // What is seen is opaque, whatever its alpha.
-                _ => seen.color(view, at, pyramids, &light).truncate().extend(1.0).to_array(),
+                _ => seen.color(setting, at).truncate().extend(1.0).to_array(),
             };
         }
     });

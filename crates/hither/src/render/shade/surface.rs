@@ -4,10 +4,10 @@
 //! once for each run of pixels that show it.
 
 use super::light::Light;
-use super::triangle::{TriangleInView, toward_eye};
+use super::triangle::{Rays, TriangleInView};
 use crate::conventions::{SurfaceId, View};
 use crate::scene::{InstanceLocator, Scene, Surface, TexturePyramids};
-use glam::{DAffine3, DMat3, DVec2, DVec3, Vec4};
+use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3, Vec4};
 
 /// An instance before the eye.
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +78,17 @@ pub(in crate::render) enum Normals {
     Vertices,
 }
 
+/// What every triangle of a picture is shaded with.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::render) struct Setting<'a> {
+    pub(in crate::render) scene: &'a Scene,
+    pub(in crate::render) rays: Rays,
+    pub(in crate::render) light: Light,
+    pub(in crate::render) normals: Normals,
+    /// Prepared for the materials of all that is shaded.
+    pub(in crate::render) pyramids: &'a TexturePyramids,
+}
+
 /// A triangle that is about to be shaded at one or more pixels.
 pub(in crate::render) struct SeenTriangle<'a> {
     in_view: TriangleInView,
@@ -86,29 +97,27 @@ pub(in crate::render) struct SeenTriangle<'a> {
     uniform: Option<Vec4>,
     /// Unit, on the eye's side, in view space.
     face_normal: DVec3,
+    /// Light around the face's normal.
+    face_light: Vec3,
     /// Unit, on the eye's side of the face taken together, in view space.
     vertex_normals: Option<[DVec3; 3]>,
 }
 
 impl<'a> SeenTriangle<'a> {
-    pub(in crate::render) fn new(
-        scene: &'a Scene,
-        placed: &Placed,
-        triangle: u32,
-        view: &View,
-        normals: Normals,
-    ) -> SeenTriangle<'a> {
-        let corners = placed.corners(scene, triangle);
-        let in_view = TriangleInView::new(view, corners);
+    pub(in crate::render) fn new(setting: &Setting<'a>, placed: &Placed, triangle: u32) -> SeenTriangle<'a> {
+        let corners = placed.corners(setting.scene, triangle);
+        let in_view = TriangleInView::new(&setting.rays, corners);
         let [a, b, c] = corners;
         // The winding says which side is the front; the eye's side is what is lit, whichever that is.
         let face_normal = ((b - a).cross(c - a) * in_view.orientation.signum()).normalize_or(DVec3::Z);
-        let vertex_normals = match normals {
+        let vertex_normals = match setting.normals {
             Normals::Face => None,
-            Normals::Vertices => vertex_normals(scene, placed, triangle, face_normal),
+            Normals::Vertices => vertex_normals(setting.scene, placed, triangle, face_normal),
         };
-        let surface = scene.surface(placed.mesh, triangle);
-        SeenTriangle { in_view, surface, uniform: surface.uniform_color(), face_normal, vertex_normals }
+        let surface = setting.scene.surface(placed.mesh, triangle);
+        let face_light = setting.light.around(face_normal);
+        let uniform = surface.uniform_color();
+        SeenTriangle { in_view, surface, uniform, face_normal, face_light, vertex_normals }
     }
 
     /// Unit normal on the eye's side, in view space, at the point seen at `at` (pixels).
@@ -123,18 +132,17 @@ impl<'a> SeenTriangle<'a> {
     }
 
     /// Linear RGBA, straight alpha, of the pixel centred at `at` (pixels), lit.
-    pub(in crate::render) fn color(
-        &self,
-        view: &View,
-        at: DVec2,
-        pyramids: &TexturePyramids,
-        light: &Light,
-    ) -> Vec4 {
+    pub(in crate::render) fn color(&self, setting: &Setting, at: DVec2) -> Vec4 {
         let base = self.uniform.unwrap_or_else(|| {
             let weights = self.in_view.weights(at);
-            self.surface.base_color(weights, self.in_view.weights_per_pixel(at), pyramids)
+            self.surface.base_color(weights, self.in_view.weights_per_pixel(at), setting.pyramids)
         });
-        base * light.on(self.normal(at), toward_eye(view, at)).extend(1.0)
+        let normal = self.normal(at);
+        let around = match self.vertex_normals {
+            None => self.face_light,
+            Some(_) => setting.light.around(normal),
+        };
+        base * (around + setting.light.ahead(normal, setting.rays.toward_eye(at))).extend(1.0)
     }
 }
 

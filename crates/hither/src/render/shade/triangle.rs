@@ -11,6 +11,35 @@ use crate::conventions::{Projection, View};
 use glam::{DVec2, DVec3};
 use std::ops::Range;
 
+/// The rays through the points of a view's image.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::render) struct Rays {
+    pinhole: bool,
+    /// View-space width of a pixel, at distance 1 for a pinhole.
+    unit: f64,
+    /// Middle of the image, pixels.
+    middle: DVec2,
+}
+
+impl Rays {
+    pub(in crate::render) fn new(view: &View) -> Rays {
+        Rays {
+            pinhole: matches!(view.projection, Projection::Perspective { .. }),
+            unit: 1.0 / view.pixels_per_unit(),
+            middle: DVec2::new(f64::from(view.width), f64::from(view.height)) * 0.5,
+        }
+    }
+
+    /// The direction from a surface seen at `at` (pixels) to the eye, unit, in view space.
+    pub(in crate::render) fn toward_eye(&self, at: DVec2) -> DVec3 {
+        if !self.pinhole {
+            return DVec3::Z;
+        }
+        let aside = (self.middle - at) * self.unit;
+        DVec3::new(aside.x, -aside.y, 1.0).normalize()
+    }
+}
+
 /// A triangle as the rays of a view meet it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::render) struct TriangleInView {
@@ -24,15 +53,11 @@ pub(in crate::render) struct TriangleInView {
 
 impl TriangleInView {
     /// `corners` in view space.
-    pub(in crate::render) fn new(view: &View, corners: [DVec3; 3]) -> TriangleInView {
-        let h = corners.map(|c| match view.projection {
-            Projection::Perspective { .. } => DVec3::new(c.x, c.y, -c.z),
-            Projection::Orthographic { .. } => DVec3::new(c.x, c.y, 1.0),
-        });
-        let unit = 1.0 / view.pixels_per_unit();
-        let (half_width, half_height) = (f64::from(view.width) * 0.5, f64::from(view.height) * 0.5);
+    pub(in crate::render) fn new(rays: &Rays, corners: [DVec3; 3]) -> TriangleInView {
+        let h = corners.map(|c| DVec3::new(c.x, c.y, if rays.pinhole { -c.z } else { 1.0 }));
         let across_pixels = |n: DVec3| {
-            DVec3::new(n.x * unit, -n.y * unit, n.z - n.x * unit * half_width + n.y * unit * half_height)
+            let (x, y) = (n.x * rays.unit, n.y * rays.unit);
+            DVec3::new(x, -y, n.z - x * rays.middle.x + y * rays.middle.y)
         };
         let normals = [h[1].cross(h[2]), h[2].cross(h[0]), h[0].cross(h[1])];
         TriangleInView {
@@ -120,19 +145,6 @@ pub(in crate::render) fn depth_at(projection: &Projection, distance: f64) -> Opt
     (depth > 0.0 && depth <= 1.0).then_some(depth as f32)
 }
 
-/// The direction from a surface seen at `at` (pixels) to the eye, unit, in view space.
-pub(in crate::render) fn toward_eye(view: &View, at: DVec2) -> DVec3 {
-    match view.projection {
-        Projection::Perspective { .. } => {
-            let unit = 1.0 / view.pixels_per_unit();
-            let right = (at.x - f64::from(view.width) * 0.5) * unit;
-            let up = (f64::from(view.height) * 0.5 - at.y) * unit;
-            -DVec3::new(right, up, -1.0).normalize()
-        }
-        Projection::Orthographic { .. } => DVec3::Z,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -170,7 +182,7 @@ mod tests {
             let view = view(if flat { PARALLEL } else { PINHOLE });
             let w = DVec3::new(1.0, u, v) / (1.0 + u + v);
             let seen = a * w.x + b * w.y + c * w.z;
-            let triangle = TriangleInView::new(&view, [a, b, c]);
+            let triangle = TriangleInView::new(&Rays::new(&view), [a, b, c]);
             prop_assume!(triangle.orientation.abs() > 1e-2);
             let at = project(&view, seen);
             let found = triangle.weights(at);
@@ -184,7 +196,7 @@ mod tests {
             a in point(), b in point(), c in point(), flat in any::<bool>(),
         ) {
             let view = view(if flat { PARALLEL } else { PINHOLE });
-            let triangle = TriangleInView::new(&view, [a, b, c]);
+            let triangle = TriangleInView::new(&Rays::new(&view), [a, b, c]);
             prop_assume!(triangle.orientation.abs() > 0.1);
             let at = project(&view, (a + b + c) / 3.0);
             let [right, down] = triangle.weights_per_pixel(at);
@@ -205,8 +217,8 @@ mod tests {
             let view = view(PINHOLE);
             let d = a + c - b;
             let at = DVec2::new(f64::from(x) * 2.0, f64::from(y) * 2.0);
-            let [first, second] = [[a, b, c], [a, c, d]].map(|t| TriangleInView::new(&view, t));
-            let [other, another] = [[a, b, d], [b, c, d]].map(|t| TriangleInView::new(&view, t));
+            let [first, second] = [[a, b, c], [a, c, d]].map(|t| TriangleInView::new(&Rays::new(&view), t));
+            let [other, another] = [[a, b, d], [b, c, d]].map(|t| TriangleInView::new(&Rays::new(&view), t));
             let hits = |t: &TriangleInView| u32::from(t.hit(at).is_some());
             let (one, two) = (hits(&first) + hits(&second), hits(&other) + hits(&another));
             prop_assert!(one <= 1 && two <= 1);
@@ -222,7 +234,7 @@ mod tests {
             a in any_point(), b in any_point(), c in any_point(),
             x in -100.0..100.0f64, y in -100.0..100.0f64, scale in prop::sample::select(vec![1.0, 1e-30, 1e30]),
         ) {
-            let triangle = TriangleInView::new(&view(PINHOLE), [a * scale, b * scale, c * scale]);
+            let triangle = TriangleInView::new(&Rays::new(&view(PINHOLE)), [a * scale, b * scale, c * scale]);
             let w = triangle.weights(DVec2::new(x, y));
             prop_assert!(w.min_element() >= 0.0 && (w.element_sum() - 1.0).abs() < 1e-9);
             prop_assert!(triangle.weights_per_pixel(DVec2::new(x, y)).iter().all(|s| s.is_finite()));
