@@ -216,6 +216,11 @@ impl Surface<'_> {
         uniform.then(|| self.bounded(self.base_color))
     }
 
+    /// Whether a texture is looked at, so that a pixel's size matters.
+    pub fn is_textured(&self) -> bool {
+        self.texture.is_some()
+    }
+
     /// Linear RGBA with straight alpha in [0, 1], at barycentric weights `at`, averaged over a pixel:
     /// `per_pixel` is how the weights change from one pixel to the next, in x and in y. Material × vertices
     /// × texture, prefiltered where the texture is shrunk. Alpha is 1 unless the surface is blended.

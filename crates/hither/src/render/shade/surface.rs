@@ -135,7 +135,9 @@ impl<'a> SeenTriangle<'a> {
     pub(in crate::render) fn color(&self, setting: &Setting, at: DVec2) -> Vec4 {
         let base = self.uniform.unwrap_or_else(|| {
             let weights = self.in_view.weights(at);
-            self.surface.base_color(weights, self.in_view.weights_per_pixel(at), setting.pyramids)
+            let textured = self.surface.is_textured();
+            let per_pixel = if textured { self.in_view.weights_per_pixel(at) } else { [DVec3::ZERO; 2] };
+            self.surface.base_color(weights, per_pixel, setting.pyramids)
         });
         let normal = self.normal(at);
         let around = match self.vertex_normals {
