@@ -29,9 +29,11 @@ pub fn short(x: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
 }
 
-/// Three numbers, short.
+/// Three numbers, short. What is nothing beside the largest is 0.
 pub fn point(p: DVec3) -> String {
-    format!("{},{},{}", short(p.x), short(p.y), short(p.z))
+    let least = p.abs().max_element() * 1e-9;
+    let [x, y, z] = p.to_array().map(|c| short(if c.abs() < least { 0.0 } else { c }));
+    format!("{x},{y},{z}")
 }
 
 /// `n thing`, with an `s` unless `n` is 1.
@@ -53,5 +55,6 @@ mod tests {
     fn short_keeps_four_digits_and_no_tail_of_zeros() {
         let texts: Vec<String> = [0.0, -0.0, 1.0, 0.25, 12.3456, 123_456.7, -2e18, 1e-18].map(short).into();
         assert_eq!(texts, ["0", "0", "1", "0.25", "12.35", "123457", "-2.000e18", "1.000e-18"]);
+        assert_eq!(point(DVec3::new(5e-17, -6.5, 2e-3)), "0,-6.5,0.002");
     }
 }

@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# Makes the pictures of the documentation, all from generated worlds. Takes about a minute after the build.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+cargo build --release --package hither-cli
+hither() { "${CARGO_TARGET_DIR:-target}/release/hither" "$@"; }
+sky=232,238,245
+office='world:office?n=33'
+
+hither render "$office" --camera open --size 960x540 --background $sky -o docs/pictures/office.png
+hither render "$office" --camera open --size 480x270 --shade ids --background $sky -o docs/pictures/ids.png
+hither render "$office" --camera open --size 480x270 --shade depth --background $sky -o docs/pictures/depth.png
+hither render "$office" --camera open --size 480x270 --shade complexity -o docs/pictures/work-hzb.png
+hither render "$office" --camera open --size 480x270 --shade complexity --algorithm zbuffer \
+  -o docs/pictures/work-zbuffer.png
+hither render world:hills --camera valley --size 960x540 --background $sky -o docs/pictures/hills.png
