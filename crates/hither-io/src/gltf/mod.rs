@@ -1,9 +1,139 @@
-//! glTF 2.0, text and binary. (The reader follows.)
+//! glTF 2.0, text and binary, in and out.
+//!
+//! Reading goes shell → JSON → buffers → nodes → meshes → materials and textures → cameras, animations; each
+//! step checks every number that it uses, so that later ones need not. Only what the default scene shows
+//! is read. The scene that comes out has one group, the scene's nodes depth-first.
+
+mod accessor;
+mod animation;
+mod buffers;
+mod camera;
+mod container;
+mod fault;
+mod json;
+mod material;
+mod mesh;
+mod meshopt;
+mod node;
+mod texture;
+mod uri;
 
 use crate::{Error, Loaded};
+use buffers::Buffers;
+use fault::{Fault, Oddities, malformed, quoted, unsupported};
+use hither::scene::{Content, Scene};
+use json::Document;
+use material::Materials;
+use std::collections::BTreeSet;
+use std::fs;
 use std::path::Path;
+use texture::Textures;
 
-/// Reads the glTF file at `path`.
+/// Extensions that a file may require: read, or without influence on what Hither shows.
+const KNOWN_EXTENSIONS: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_basisu",
+    "KHR_texture_transform",
+    "KHR_xmp_json_ld",
+];
+/// They change how light plays on a surface, and leave its base colour.
+const MATERIAL_EXTENSIONS: &str = "KHR_materials_";
+const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// Reads the `.gltf` or `.glb` file at `path`.
 pub(crate) fn read(path: &Path) -> Result<Loaded, Error> {
-    Err(Error::Unsupported { path: path.to_owned(), message: "glTF is not read yet".into() })
+    let bytes = fs::read(path).map_err(|source| Fault::Io(path.to_owned(), source).of_file(path))?;
+    read_bytes(&bytes, path).map_err(|fault| fault.of_file(path))
+}
+
+/// Reads a file's content; `path` says where its other files are.
+fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded, Fault> {
+    let named_glb = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
+    let parts = container::split(bytes, named_glb)?;
+    let document = json::parse(&bytes[parts.json])
+        .or_else(|e| malformed(format!("its JSON is not that of a glTF file: {}", one_line(&e))))?;
+    check_version(&document)?;
+    check_extensions(&document)?;
+    let mut oddities = Oddities::default();
+    let buffers = Buffers::load(&document, bytes, parts.bin, path)?;
+    let scene = assemble(&buffers, path, &mut oddities)?;
+    match scene.validate() {
+        Ok(()) => Ok(Loaded { scene, diagnostics: oddities.into_diagnostics() }),
+        Err(e) => malformed(one_line(&e.to_string())),
+    }
+}
+
+fn assemble(buffers: &Buffers, path: &Path, oddities: &mut Oddities) -> Result<Scene, Fault> {
+    let document = buffers.document();
+    let mut hierarchy = node::read(buffers, oddities)?;
+    let contents = hierarchy.group.nodes.iter().map(|n| n.content);
+    let shown = |content| if let Content::Mesh(m) = content { Some(m as usize) } else { None };
+    let used: BTreeSet<usize> = contents.filter_map(shown).collect();
+    let mut scene_index = vec![0u32; document.meshes.len()];
+    for (new, &old) in used.iter().enumerate() {
+        scene_index[old] = new as u32;
+    }
+    let materials = Materials::used_by(document, &used);
+    let meshes =
+        used.iter().map(|&m| mesh::read(buffers, &materials, oddities, m)).collect::<Result<_, _>>()?;
+    let textures = Textures::load(buffers, &materials, path, oddities);
+    let read_material = |m| material::read(document, oddities, m, |t| textures.scene_index(t));
+    let scene_materials = materials.used().map(read_material).collect();
+    let cameras = camera::read(document, &hierarchy, oddities);
+    let animations = animation::read(buffers, &hierarchy, oddities);
+    for node in &mut hierarchy.group.nodes {
+        if let Content::Mesh(mesh) = &mut node.content {
+            *mesh = scene_index[*mesh as usize];
+        }
+    }
+    Ok(Scene {
+        name: hierarchy.name,
+        meshes,
+        materials: scene_materials,
+        textures: textures.textures,
+        groups: vec![hierarchy.group],
+        root: 0,
+        cameras,
+        animations,
+    })
+}
+
+fn check_version(document: &Document) -> Result<(), Fault> {
+    let Some(version) = &document.asset.version else {
+        return malformed("it does not say which version of glTF it is (asset.version)");
+    };
+    if version != "2" && !version.starts_with("2.") {
+        return unsupported(format!("it is glTF version {}; convert it to version 2.0", quoted(version)));
+    }
+    match &document.asset.min_version {
+        Some(least) if least != "2.0" => {
+            unsupported(format!("it needs glTF version {} at least; only 2.0 is read", quoted(least)))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_extensions(document: &Document) -> Result<(), Fault> {
+    for name in &document.extensions_required {
+        if name == DRACO {
+            return unsupported(mesh::draco_is_needed());
+        }
+        if !KNOWN_EXTENSIONS.contains(&name.as_str()) && !name.starts_with(MATERIAL_EXTENSIONS) {
+            return unsupported(format!(
+                "it requires the extension {}, which is not supported; export it without",
+                quoted(name)
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// A library's message with whatever it quotes from the file kept on one line.
+fn one_line(message: &str) -> String {
+    message.chars().map(|c| if c.is_control() { ' ' } else { c }).take(300).collect()
 }
