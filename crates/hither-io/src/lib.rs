@@ -19,7 +19,6 @@ mod polygon;
 mod srgb;
 pub mod stl;
 mod text;
-#[allow(dead_code)] // its users follow
 mod texture;
 mod weld;
 

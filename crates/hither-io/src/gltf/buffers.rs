@@ -7,9 +7,9 @@ use super::fault::{Fault, malformed, part, quoted, unsupported};
 use super::json::{Document, Index, Meshopt, Whole};
 use super::meshopt::{self, Filter, Mode};
 use super::uri;
+use crate::Companions;
 use std::cell::{Cell, OnceCell};
 use std::ops::Range;
-use std::path::Path;
 
 /// What any file may expand to, bytes.
 const BUDGET_BASE: u64 = 256 << 20;
@@ -33,24 +33,24 @@ enum Content {
 }
 
 impl<'a> Buffers<'a> {
-    /// Loads all buffers. `bin` is the binary chunk's place in `file`, the bytes of the file at `path`.
+    /// Loads all buffers. `bin` is the binary chunk's place in `file`, the whole file's bytes.
     pub(super) fn load(
         document: &'a Document,
         file: &'a [u8],
         bin: Option<Range<usize>>,
-        path: &Path,
+        companions: &dyn Companions,
     ) -> Result<Buffers<'a>, Fault> {
         let mut contents = Vec::with_capacity(document.buffers.len());
         let mut total = file.len() as u64;
         for (i, buffer) in document.buffers.iter().enumerate() {
             let place = || match &buffer.uri {
-                Some(uri) if !uri.starts_with("data:") => part("buffer", i, uri),
+                Some(uri) if !uri::is_data(uri) => part("buffer", i, uri),
                 _ => part("buffer", i, ""),
             };
             let Whole(length) = buffer.byte_length;
             let content = match &buffer.uri {
                 _ if buffer.extensions.meshopt.fallback => Content::Absent,
-                Some(uri) => Content::Loaded(uri::load(uri, path, length).map_err(|f| named(f, place()))?),
+                Some(uri) => Content::Loaded(uri::load(uri, companions).map_err(|f| f.at(place()))?),
                 None => match &bin {
                     Some(range) if i == 0 => Content::InFile(range.clone()),
                     _ => Content::Absent,
@@ -171,16 +171,5 @@ impl<'a> Buffers<'a> {
         };
         meshopt::decode(source, mode, filter, count, stride)
             .or_else(|e| malformed(format!("its compressed data is damaged: {e}; fetch the file again")))
-    }
-}
-
-/// A buffer that cannot be read, told as the model's fault: the model says where it is to be.
-fn named(fault: Fault, place: String) -> Fault {
-    match fault {
-        Fault::Io(path, source) => Fault::Malformed(format!(
-            "{place} is to be read from \"{}\", which failed: {source}; put the file there",
-            path.display()
-        )),
-        other => other.at(place),
     }
 }

@@ -2,8 +2,7 @@
 
 use crate::{Diagnostic, Error};
 use std::collections::HashMap;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Why a file is refused; [`Fault::of_file`] adds which file.
 #[derive(Debug)]
@@ -12,8 +11,6 @@ pub(super) enum Fault {
     Malformed(String),
     /// The file needs something that is not supported.
     Unsupported(String),
-    /// The system refused to read `path`.
-    Io(PathBuf, io::Error),
 }
 
 pub(super) fn malformed<T>(message: impl Into<String>) -> Result<T, Fault> {
@@ -30,7 +27,6 @@ impl Fault {
         match self {
             Fault::Malformed(m) => Fault::Malformed(format!("{place}: {m}")),
             Fault::Unsupported(m) => Fault::Unsupported(format!("{place}: {m}")),
-            Fault::Io(path, source) => Fault::Io(path, source),
         }
     }
 
@@ -38,7 +34,6 @@ impl Fault {
     pub(super) fn message(self) -> String {
         match self {
             Fault::Malformed(m) | Fault::Unsupported(m) => m,
-            Fault::Io(path, source) => format!("cannot read {}: {source}", path.display()),
         }
     }
 
@@ -47,7 +42,6 @@ impl Fault {
         match self {
             Fault::Malformed(message) => Error::Malformed { path, message },
             Fault::Unsupported(message) => Error::Unsupported { path, message },
-            Fault::Io(path, source) => Error::Io { path, action: "cannot read", source },
         }
     }
 }

@@ -18,7 +18,7 @@ mod node;
 mod texture;
 mod uri;
 
-use crate::{Error, Loaded};
+use crate::{Companions, Error, Loaded, ModelFolder};
 use buffers::Buffers;
 use fault::{Fault, Oddities, malformed, quoted, unsupported};
 use hither::scene::{Content, Scene};
@@ -47,28 +47,36 @@ const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// Reads the `.gltf` or `.glb` file at `path`.
 pub(crate) fn read(path: &Path) -> Result<Loaded, Error> {
-    let bytes = fs::read(path).map_err(|source| Fault::Io(path.to_owned(), source).of_file(path))?;
-    read_bytes(&bytes, path).map_err(|fault| fault.of_file(path))
+    let bytes = fs::read(path).map_err(|source| Error::Io {
+        path: path.to_owned(),
+        action: "cannot read",
+        source,
+    })?;
+    parse(&bytes, path, &ModelFolder::of(path))
 }
 
-/// Reads a file's content; `path` says where its other files are.
-fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded, Fault> {
+/// Reads a file's content. `path` is for messages; other files that it names come from `companions`.
+pub(crate) fn parse(bytes: &[u8], path: &Path, companions: &dyn Companions) -> Result<Loaded, Error> {
     let named_glb = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
+    parse_parts(bytes, named_glb, companions).map_err(|fault| fault.of_file(path))
+}
+
+fn parse_parts(bytes: &[u8], named_glb: bool, companions: &dyn Companions) -> Result<Loaded, Fault> {
     let parts = container::split(bytes, named_glb)?;
     let document = json::parse(&bytes[parts.json])
         .or_else(|e| malformed(format!("its JSON is not that of a glTF file: {}", one_line(&e))))?;
     check_version(&document)?;
     check_extensions(&document)?;
     let mut oddities = Oddities::default();
-    let buffers = Buffers::load(&document, bytes, parts.bin, path)?;
-    let scene = assemble(&buffers, path, &mut oddities)?;
+    let buffers = Buffers::load(&document, bytes, parts.bin, companions)?;
+    let scene = assemble(&buffers, companions, &mut oddities)?;
     match scene.validate() {
         Ok(()) => Ok(Loaded { scene, diagnostics: oddities.into_diagnostics() }),
         Err(e) => malformed(one_line(&e.to_string())),
     }
 }
 
-fn assemble(buffers: &Buffers, path: &Path, oddities: &mut Oddities) -> Result<Scene, Fault> {
+fn assemble(buffers: &Buffers, companions: &dyn Companions, oddities: &mut Oddities) -> Result<Scene, Fault> {
     let document = buffers.document();
     let mut hierarchy = node::read(buffers, oddities)?;
     let contents = hierarchy.group.nodes.iter().map(|n| n.content);
@@ -81,7 +89,7 @@ fn assemble(buffers: &Buffers, path: &Path, oddities: &mut Oddities) -> Result<S
     let materials = Materials::used_by(document, &used);
     let meshes =
         used.iter().map(|&m| mesh::read(buffers, &materials, oddities, m)).collect::<Result<_, _>>()?;
-    let textures = Textures::load(buffers, &materials, path, oddities);
+    let textures = Textures::load(buffers, &materials, companions, oddities);
     let read_material = |m| material::read(document, oddities, m, |t| textures.scene_index(t));
     let scene_materials = materials.used().map(read_material).collect();
     let cameras = camera::read(document, &hierarchy, oddities);
