@@ -10,7 +10,7 @@ mod companions;
 mod error;
 mod exr;
 mod format;
-mod gltf;
+pub mod gltf;
 pub mod obj;
 mod oddities;
 pub mod ply;
@@ -26,6 +26,7 @@ pub use atomic::{check_writable, write_whole};
 pub use companions::{Companions, ModelFolder};
 pub use error::{Diagnostic, Error, Loaded};
 pub use exr::{ExrImage, write_exr};
+pub use gltf::write_glb;
 pub use png::write_png;
 
 use format::Format;

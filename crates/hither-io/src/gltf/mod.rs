@@ -17,6 +17,9 @@ mod meshopt;
 mod node;
 mod texture;
 mod uri;
+mod write;
+
+pub use write::write_glb;
 
 use crate::{Companions, Error, Loaded, ModelFolder};
 use buffers::Buffers;
@@ -46,22 +49,25 @@ const MATERIAL_EXTENSIONS: &str = "KHR_materials_";
 const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// Reads the `.gltf` or `.glb` file at `path`.
-pub(crate) fn read(path: &Path) -> Result<Loaded, Error> {
+///
+/// Errors: the file cannot be read, it breaks glTF's rules, or it needs what is not supported.
+pub fn read(path: &Path) -> Result<Loaded, Error> {
     let bytes = fs::read(path).map_err(|source| Error::Io {
         path: path.to_owned(),
         action: "cannot read",
         source,
     })?;
-    parse(&bytes, path, &ModelFolder::of(path))
+    from_bytes(path, &bytes, &ModelFolder::of(path))
 }
 
-/// Reads a file's content. `path` is for messages; other files that it names come from `companions`.
-pub(crate) fn parse(bytes: &[u8], path: &Path, companions: &dyn Companions) -> Result<Loaded, Error> {
+/// Reads a `.gltf` or `.glb` file's content. `path` is for messages; files that it names come from
+/// `companions`. Errors: as [`read`].
+pub fn from_bytes(path: &Path, bytes: &[u8], companions: &dyn Companions) -> Result<Loaded, Error> {
     let named_glb = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
-    parse_parts(bytes, named_glb, companions).map_err(|fault| fault.of_file(path))
+    read_parts(bytes, named_glb, companions).map_err(|fault| fault.of_file(path))
 }
 
-fn parse_parts(bytes: &[u8], named_glb: bool, companions: &dyn Companions) -> Result<Loaded, Fault> {
+fn read_parts(bytes: &[u8], named_glb: bool, companions: &dyn Companions) -> Result<Loaded, Fault> {
     let parts = container::split(bytes, named_glb)?;
     let document = json::parse(&bytes[parts.json])
         .or_else(|e| malformed(format!("its JSON is not that of a glTF file: {}", one_line(&e))))?;
