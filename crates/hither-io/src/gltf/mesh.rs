@@ -343,8 +343,8 @@ fn drop_non_finite(mesh: &mut Mesh, place: &str, oddities: &mut Oddities) {
 fn tidy_attributes(mesh: &mut Mesh, place: &str, oddities: &mut Oddities) {
     let mut bad_normals = false;
     for normal in &mut mesh.normals {
-        // What is unit to within rounding keeps its bits.
-        if (normal.length_squared() - 1.0).abs() > 1e-6 {
+        // What is unit to within rounding keeps its bits. (NaN is in no range.)
+        if !(0.999_999..=1.000_001).contains(&normal.length_squared()) {
             *normal = normal.as_dvec3().try_normalize().map_or(Vec3::ZERO, |n| n.as_vec3());
             bad_normals |= *normal == Vec3::ZERO;
         }

@@ -15,6 +15,8 @@ mod material;
 mod mesh;
 mod meshopt;
 mod node;
+#[cfg(test)]
+mod tests;
 mod texture;
 mod uri;
 mod write;
