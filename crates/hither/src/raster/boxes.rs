@@ -31,13 +31,13 @@ pub struct BoxSet {
 #[derive(Clone, Copy, Debug)]
 pub struct ProjectedBoxes {
     /// First column of each box's pixel centres, window coordinates, clipped to the window.
-    pub left: [f32; 16],
+    pub left: [i32; 16],
     /// First row.
-    pub top: [f32; 16],
+    pub top: [i32; 16],
     /// Last column (inclusive).
-    pub right: [f32; 16],
+    pub right: [i32; 16],
     /// Last row (inclusive).
-    pub bottom: [f32; 16],
+    pub bottom: [i32; 16],
     /// No point of the box has a larger depth; +∞ where the box may reach the near plane.
     pub depth: [f32; 16],
     /// Boxes that may hold a pixel centre of the window.
@@ -129,10 +129,10 @@ pub fn project_boxes<S: Simd>(
         alive &= !outside_sides(simd, set, &x, &y, min, max, window) | !(crossing.to_bitmask() as u16);
     }
     ProjectedBoxes {
-        left: store(edges[0]),
-        top: store(edges[1]),
-        right: store(edges[2]),
-        bottom: store(edges[3]),
+        left: store_whole(edges[0]),
+        top: store_whole(edges[1]),
+        right: store_whole(edges[2]),
+        bottom: store_whole(edges[3]),
         depth: store(safe.select(depth, f32x16::splat(simd, f32::INFINITY))),
         alive,
     }
@@ -142,10 +142,10 @@ pub fn project_boxes<S: Simd>(
 #[inline(never)]
 fn everywhere(window: Rect) -> ProjectedBoxes {
     ProjectedBoxes {
-        left: [0.0; 16],
-        top: [0.0; 16],
-        right: [(window.right - window.left - 1) as f32; 16],
-        bottom: [(window.bottom - window.top - 1) as f32; 16],
+        left: [0; 16],
+        top: [0; 16],
+        right: [window.right - window.left - 1; 16],
+        bottom: [window.bottom - window.top - 1; 16],
         depth: [f32::INFINITY; 16],
         alive: 0xFFFF,
     }
@@ -217,5 +217,12 @@ fn largest<S: Simd>(v: &[f32x16<S>; 8]) -> f32x16<S> {
 fn store<S: Simd>(v: f32x16<S>) -> [f32; 16] {
     let mut out = [0.0; 16];
     v.store_slice(&mut out);
+    out
+}
+
+#[inline(always)]
+fn store_whole<S: Simd>(v: f32x16<S>) -> [i32; 16] {
+    let mut out = [0; 16];
+    v.to_int::<fearless_simd::i32x16<S>>().store_slice(&mut out);
     out
 }

@@ -69,6 +69,12 @@ pub fn draw_block<S: Simd>(
         let lane = rest.trailing_zeros() as usize;
         rest &= rest - 1;
         let triangle = lanes.get(lane);
+        if lanes.single & !block.masked & (1 << lane) != 0 {
+            let id = SurfaceId { instance: drawing.instance, triangle: block.triangle[lane] };
+            counts.drawn += 1;
+            counts.wrote |= fill_pixel(simd, target, &triangle, id, drawing.hierarchical);
+            continue;
+        }
         draw_lane(simd, target, block, drawing, lane, &triangle, is_hole, &mut counts);
     }
     if lanes.clip != 0 {
@@ -468,6 +474,47 @@ fn fill_block<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
         let min = new.reduce_min();
         target.raise_block_minimum(tile, block, min);
     }
+}
+
+/// Fills a triangle that covers one pixel: the operations of [`fill_block`] on one lane.
+#[inline(always)]
+fn fill_pixel<S: Simd>(
+    simd: S,
+    target: &mut Target,
+    t: &ScreenTriangle,
+    id: SurfaceId,
+    hierarchical: bool,
+) -> bool {
+    let (x, y) = (t.bounds.left - target.left, t.bounds.top - target.top);
+    let tile = (y >> 4) as usize * target.tiles_x + (x >> 4) as usize;
+    let block = ((y >> 2 & 3) * 4 + (x >> 2 & 3)) as usize;
+    if target.visits.is_some() {
+        target.count_polygon_visit((x, y), 1, 1);
+    }
+    let block_min = target.block_minima(tile)[block];
+    if hierarchical && t.depth_max < block_min {
+        return false;
+    }
+    target.touch(tile);
+    let (at, pixel) = (tile * 16 + block, ((y & 3) * 4 + (x & 3)) as usize);
+    let (corner_x, corner_y) = (f64::from(t.bounds.left & !3), f64::from(t.bounds.top & !3));
+    let origin = ((t.plane[0] * corner_x + t.plane[1] * corner_y) + t.plane[2]) as f32;
+    let step = (x & 3) as f32 * t.plane[0] as f32 + (y & 3) as f32 * t.plane[1] as f32;
+    let z = (step + origin).max(t.depth_min).min(t.depth_max);
+    let old = target.depth[at].0[pixel];
+    let wins = z > old || (z == old && z > 0.0 && id < target.surfaces[target.id[at].0[pixel] as usize]);
+    if !wins {
+        return false;
+    }
+    target.depth[at].0[pixel] = z;
+    target.id[at].0[pixel] = target.surfaces.len() as u32;
+    target.surfaces.push(id);
+    target.counters.pixels_written += 1;
+    if hierarchical && old == block_min {
+        let min = f32x16::from_slice(simd, &target.depth[at].0).reduce_min();
+        target.raise_block_minimum(tile, block, min);
+    }
+    true
 }
 
 /// Of the pixels that hold exactly this depth, those whose surface has a larger id.

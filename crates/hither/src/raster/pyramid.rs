@@ -209,66 +209,112 @@ impl Target {
         true
     }
 
+    /// A first, cheap look: whether the one pyramid sample around `[left, top, right, bottom]` (inclusive, in
+    /// the window) hides `depth` — step 2 of [Greene 1995, fig. 3.5]. Stale samples are too far, so still
+    /// a bound.
+    #[inline(always)]
+    pub(crate) fn one_sample_hides(&self, rect: [u16; 4], depth: f32) -> bool {
+        let [left, top, right, bottom] = rect;
+        let differ = u32::from((left ^ right) | (top ^ bottom));
+        // Finest cells of side 4^(k+1) that hold both corners.
+        let level = ((31 - (differ | 1).leading_zeros()) / 2) as usize;
+        let Some(samples) = self.levels.get(level) else { return false };
+        let shift = 2 * (level + 1);
+        let (x, y) = ((left >> shift) as usize, (top >> shift) as usize);
+        samples.min[(y >> 2) * samples.columns + (x >> 2)].0[(y & 3) * 4 + (x & 3)] > depth
+    }
+
     /// Whether some pixel of `[left, top, right, bottom]` (inclusive) inside this parent cell holds
     /// `depth` or something farther.
     #[inline(always)]
     fn shows_in<S: Simd>(
         &mut self,
         simd: S,
-        level: usize,
+        top_level: usize,
         parent_x: usize,
         parent_y: usize,
         rect: [i32; 4],
         depth: f32,
     ) -> bool {
-        let wanted = f32x16::splat(simd, depth);
-        // An explicit stack: at most 2×2 cells are open a level along a border, 16 in the worst case.
-        let mut stack = [(0u8, 0u16, 0u16); 16 * 8];
-        stack[0] = (level as u8, parent_x as u16, parent_y as u16);
-        let mut open = 1;
-        while open > 0 {
-            open -= 1;
-            let (level, px, py) = (stack[open].0 as usize, stack[open].1 as usize, stack[open].2 as usize);
-            let parent = py * self.levels[level].columns + px;
-            if self.levels[level].stale[parent] != 0 {
-                self.refresh(simd, level, parent);
-            }
-            let shift = 2 * (level as u32 + 1);
-            // The rectangle in children of this parent, and the children it covers whole.
-            let base_x = (px as i32) << 2;
-            let base_y = (py as i32) << 2;
-            let x0 = ((rect[0] >> shift) - base_x).max(0);
-            let y0 = ((rect[1] >> shift) - base_y).max(0);
-            let x1 = ((rect[2] >> shift) - base_x).min(3);
-            let y1 = ((rect[3] >> shift) - base_y).min(3);
-            let values = f32x16::from_slice(simd, &self.levels[level].min[parent].0);
-            let mut bits = values.simd_le(wanted).to_bitmask() as u32 & cell_mask(x0, y0, x1, y1);
-            self.count_cube_visit(level, parent, cell_mask(x0, y0, x1, y1));
+        // Depth first: for each level above the present one, the parent and its children still to visit.
+        let mut above = [(0u32, 0u32, 0u32); MAX_LEVELS];
+        let mut level = top_level;
+        let (mut px, mut py) = (parent_x as u32, parent_y as u32);
+        let mut bits = match self.open_children(simd, level, px, py, rect, depth) {
+            Children::Shown => return true,
+            Children::Open(bits) => bits,
+        };
+        loop {
             if bits == 0 {
+                if level == top_level {
+                    return false;
+                }
+                level += 1;
+                (px, py, bits) = above[level];
                 continue;
             }
-            let unit = 1i32 << shift;
-            let whole_x0 = ((rect[0] + unit - 1) >> shift) - base_x;
-            let whole_y0 = ((rect[1] + unit - 1) >> shift) - base_y;
-            let whole_x1 = ((rect[2] + 1) >> shift) - base_x - 1;
-            let whole_y1 = ((rect[3] + 1) >> shift) - base_y - 1;
-            let whole = cell_mask(whole_x0.max(0), whole_y0.max(0), whole_x1.min(3), whole_y1.min(3));
-            if bits & whole != 0 {
-                return true; // a whole child's minimum is a pixel of the rectangle
-            }
-            while bits != 0 {
-                let c = bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                let (cx, cy) = (px * 4 + c % 4, py * 4 + c / 4);
-                if level > 0 {
-                    stack[open] = (level as u8 - 1, cx as u16, cy as u16);
-                    open += 1;
-                } else if self.block_shows(simd, parent, c, cx as i32, cy as i32, rect, depth) {
+            let c = bits.trailing_zeros();
+            bits &= bits - 1;
+            let (cx, cy) = (px * 4 + c % 4, py * 4 + c / 4);
+            if level == 0 {
+                let tile = py as usize * self.levels[0].columns + px as usize;
+                if self.block_shows(simd, tile, c as usize, cx as i32, cy as i32, rect, depth) {
                     return true;
                 }
+                continue;
+            }
+            let inner = match self.open_children(simd, level - 1, cx, cy, rect, depth) {
+                Children::Shown => return true,
+                Children::Open(inner) => inner,
+            };
+            if inner != 0 {
+                above[level] = (px, py, bits);
+                level -= 1;
+                (px, py, bits) = (cx, cy, inner);
             }
         }
-        false
+    }
+
+    /// Which of a parent's children meet `rect` and hold `depth` or something farther; or that one of them
+    /// lies wholly inside, whose minimum is a pixel of the rectangle.
+    #[inline(always)]
+    fn open_children<S: Simd>(
+        &mut self,
+        simd: S,
+        level: usize,
+        px: u32,
+        py: u32,
+        rect: [i32; 4],
+        depth: f32,
+    ) -> Children {
+        let parent = py as usize * self.levels[level].columns + px as usize;
+        if self.levels[level].stale[parent] != 0 {
+            self.refresh(simd, level, parent);
+        }
+        let shift = 2 * (level as u32 + 1);
+        let (base_x, base_y) = ((px as i32) << 2, (py as i32) << 2);
+        let meets = cell_mask(
+            ((rect[0] >> shift) - base_x).max(0),
+            ((rect[1] >> shift) - base_y).max(0),
+            ((rect[2] >> shift) - base_x).min(3),
+            ((rect[3] >> shift) - base_y).min(3),
+        );
+        if self.visits.is_some() {
+            self.count_cube_visit(level, parent, meets);
+        }
+        let values = f32x16::from_slice(simd, &self.levels[level].min[parent].0);
+        let bits = values.simd_le(f32x16::splat(simd, depth)).to_bitmask() as u32 & meets;
+        if bits == 0 {
+            return Children::Open(0);
+        }
+        let up = (1i32 << shift) - 1;
+        let whole = cell_mask(
+            (((rect[0] + up) >> shift) - base_x).max(0),
+            (((rect[1] + up) >> shift) - base_y).max(0),
+            (((rect[2] + 1) >> shift) - base_x - 1).min(3),
+            (((rect[3] + 1) >> shift) - base_y - 1).min(3),
+        );
+        if bits & whole != 0 { Children::Shown } else { Children::Open(bits) }
     }
 
     #[inline(always)]
@@ -404,11 +450,22 @@ impl Target {
     }
 }
 
+/// What a parent's children say of a rectangle at a depth.
+enum Children {
+    /// It shows in one of them.
+    Shown,
+    /// It may show in these.
+    Open(u32),
+}
+
+/// Levels of the pyramid of the largest image: tiles of 16 pixels, then four times as much each.
+const MAX_LEVELS: usize = 8;
+
 /// Brings stale minima up to date, from the leaves of the stale subtree upwards.
 #[inline(always)]
 fn refresh_level<S: Simd>(simd: S, levels: &mut [PyramidLevel], level: usize, parent: usize) {
     // Depth-first over stale cells; a cell is computed once its own children are fresh.
-    let mut stack = [(0u8, 0u32); 16 * 8];
+    let mut stack = [(0u8, 0u32); 16 * MAX_LEVELS];
     stack[0] = (level as u8, parent as u32);
     let mut open = 1;
     while open > 0 {

@@ -78,6 +78,8 @@ pub(super) struct Lanes {
     pub depth_max: Sixteen<f32>,
     /// Lanes to fill.
     pub draw: u16,
+    /// Lanes whose bounds hold a single pixel, which they cover.
+    pub single: u16,
     /// Lanes to clip first.
     pub clip: u16,
     /// Lanes that face the eye (clipped ones not counted).
@@ -158,6 +160,7 @@ pub(super) fn set_up<S: Simd>(simd: S, block: &TriangleBlock, at: &ScreenFromObj
         depth_min: Sixteen([0.0; 16]),
         depth_max: Sixteen([0.0; 16]),
         draw,
+        single: 0,
         clip,
         front_facing: facing,
     };
@@ -167,8 +170,18 @@ pub(super) fn set_up<S: Simd>(simd: S, block: &TriangleBlock, at: &ScreenFromObj
 
     // Corners 1 and 2 change places where that makes the area positive.
     let swap = mask32x16::from_bitmask(simd, u64::from(negative));
-    lanes.x = [store(x[0]), store(swap.select(x[2], x[1])), store(swap.select(x[1], x[2]))];
-    lanes.y = [store(y[0]), store(swap.select(y[2], y[1])), store(swap.select(y[1], y[2]))];
+    let x = [x[0], swap.select(x[2], x[1]), swap.select(x[1], x[2])];
+    let y = [y[0], swap.select(y[2], y[1]), swap.select(y[1], y[2])];
+    let single = (left.simd_eq(right) & top.simd_eq(bottom)).to_bitmask() as u16 & draw;
+    if single != 0 {
+        lanes.single = single & covers_pixel(simd, &x, &y, left, top);
+        lanes.draw &= !single | lanes.single;
+        if lanes.draw == 0 {
+            return lanes;
+        }
+    }
+    lanes.x = [store(x[0]), store(x[1]), store(x[2])];
+    lanes.y = [store(y[0]), store(y[1]), store(y[2])];
     let planes = [depth_plane(simd, &low), depth_plane(simd, &high)];
     for (i, plane) in lanes.plane.iter_mut().enumerate() {
         for half in 0..2 {
@@ -252,6 +265,28 @@ fn sane<S: Simd>(simd: S, slope: f64x8<S>) -> f64x8<S> {
 fn dot<S: Simd>(simd: S, row: &[f64; 4], p: &[f64x8<S>; 3]) -> f64x8<S> {
     let xy = f64x8::splat(simd, row[0]) * p[0] + f64x8::splat(simd, row[1]) * p[1];
     (xy + f64x8::splat(simd, row[2]) * p[2]) + f64x8::splat(simd, row[3])
+}
+
+/// Whether each lane covers pixel (px, py), by the fill rule; for triangles less than two pixels wide and
+/// high (others overflow and mean nothing).
+#[inline(always)]
+fn covers_pixel<S: Simd>(
+    simd: S,
+    x: &[i32x16<S>; 3],
+    y: &[i32x16<S>; 3],
+    px: i32x16<S>,
+    py: i32x16<S>,
+) -> u16 {
+    let zero = i32x16::splat(simd, 0);
+    let (cx, cy) = ((px << 8) + 128, (py << 8) + 128);
+    let mut outside = zero;
+    for k in 0..3 {
+        let (dx, dy) = (x[(k + 1) % 3] - x[k], y[(k + 1) % 3] - y[k]);
+        let owned = dy.simd_lt(zero) | (dy.simd_eq(zero) & dx.simd_gt(zero));
+        let bias = owned.select(zero, i32x16::splat(simd, -1));
+        outside |= dx * (cy - y[k]) - dy * (cx - x[k]) + bias;
+    }
+    !outside.simd_lt(zero).to_bitmask() as u16
 }
 
 /// First pixel whose centre 256·p + 128 is not before a box's smallest coordinate.

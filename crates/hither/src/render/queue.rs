@@ -19,10 +19,11 @@ pub(super) struct NearestFirst<T> {
 
 const NONE: u32 = u32::MAX;
 /// Depth's float bits without the sign, coarser than this many mantissa bits are ignored.
-const SHIFT: u32 = 23 - 5;
+const FINE: u32 = 9;
+const SHIFT: u32 = 23 - FINE;
 /// Depths at or below 2⁻⁶⁴ share the last bucket; those above 1 the first.
-const OCTAVES: u32 = 64;
-const BUCKETS: usize = (OCTAVES << 5) as usize + 2;
+const OCTAVES: u32 = 24;
+const BUCKETS: usize = (OCTAVES << FINE) as usize + 2;
 
 fn bucket_of(depth: f32) -> usize {
     let one = 1.0f32.to_bits() >> SHIFT;

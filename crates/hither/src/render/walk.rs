@@ -95,14 +95,14 @@ fn walk<S: Simd>(
         counters: Counters::default(),
     };
     let root = index.scene().root;
-    walk.enter(simd, Content::Group(root), ScreenFromObject::of_view(view), 0);
+    walk.enter(simd, target, Content::Group(root), ScreenFromObject::of_view(view), 0);
     while let Some(entry) = walk.open.pop() {
         if walk.hierarchical && target.hides(simd, rect_of(&entry), entry.depth) {
             walk.counters.nodes_culled += 1;
             continue;
         }
         match entry.slot.child() {
-            Child::Node(node) => walk.visit_node(simd, entry.context, entry.moving, node),
+            Child::Node(node) => walk.visit_node(simd, target, entry.context, entry.moving, node),
             Child::Leaf(leaf) => walk.visit_leaf(simd, target, entry.context, leaf),
         }
     }
@@ -110,15 +110,28 @@ fn walk<S: Simd>(
     walk.counters
 }
 
+#[inline(always)]
 fn rect_of(entry: &Entry) -> Rect {
-    let [left, top, right, bottom] = entry.rect.map(i32::from);
-    Rect { left, top, right: right + 1, bottom: bottom + 1 }
+    let r = &entry.rect;
+    Rect {
+        left: i32::from(r[0]),
+        top: i32::from(r[1]),
+        right: i32::from(r[2]) + 1,
+        bottom: i32::from(r[3]) + 1,
+    }
 }
 
 impl<'a> Walk<'a> {
     /// Opens the tree of `content` (seen through `at`) and visits its root.
     #[inline(always)]
-    fn enter<S: Simd>(&mut self, simd: S, content: Content, at: ScreenFromObject, instance: u32) {
+    fn enter<S: Simd>(
+        &mut self,
+        simd: S,
+        target: &Target,
+        content: Content,
+        at: ScreenFromObject,
+        instance: u32,
+    ) {
         let (space, bounds) = match content {
             Content::Mesh(mesh) => {
                 let blocks = &self.index.meshes[mesh as usize].solid;
@@ -136,11 +149,11 @@ impl<'a> Walk<'a> {
         let context = self.contexts.len() as u32;
         self.contexts.push(Context { space, at, boxes: BoxSet::new(&at, bounds.reach()), instance });
         match space {
-            Space::Mesh { .. } => self.visit_node(simd, context, false, 0),
+            Space::Mesh { .. } => self.visit_node(simd, target, context, false, 0),
             Space::Group(group) => {
                 for (tree, moving) in [(&group.resting, false), (&group.moving, true)] {
                     if !tree.nodes.is_empty() {
-                        self.visit_node(simd, context, moving, 0);
+                        self.visit_node(simd, target, context, moving, 0);
                     }
                 }
             }
@@ -148,7 +161,7 @@ impl<'a> Walk<'a> {
     }
 
     #[inline(always)]
-    fn visit_node<S: Simd>(&mut self, simd: S, context: u32, moving: bool, node: u32) {
+    fn visit_node<S: Simd>(&mut self, simd: S, target: &Target, context: u32, moving: bool, node: u32) {
         let c = &self.contexts[context as usize];
         let tree: &WideTree = match c.space {
             Space::Mesh { blocks, .. } => &blocks.tree,
@@ -165,13 +178,14 @@ impl<'a> Walk<'a> {
         let alive = projected.alive & (0xFFFFu32 >> (16 - node.used)) as u16;
         self.counters.nodes_visited += u64::from(node.used);
         self.counters.nodes_outside += u64::from(node.used - alive.count_ones());
-        self.push_children(&projected, alive, &node.child, context, moving);
+        self.push_children(target, &projected, alive, &node.child, context, moving);
     }
 
     /// Opens the children in `alive`.
     #[inline(always)]
     fn push_children(
         &mut self,
+        target: &Target,
         projected: &ProjectedBoxes,
         alive: u16,
         child: &[Slot; 16],
@@ -185,19 +199,22 @@ impl<'a> Walk<'a> {
             if child[lane] == Slot::EMPTY {
                 continue;
             }
-            let edge = |side: &[f32; 16]| side[lane] as u16;
             let entry = Entry {
                 slot: child[lane],
                 context,
                 moving,
                 rect: [
-                    edge(&projected.left),
-                    edge(&projected.top),
-                    edge(&projected.right),
-                    edge(&projected.bottom),
+                    projected.left[lane] as u16,
+                    projected.top[lane] as u16,
+                    projected.right[lane] as u16,
+                    projected.bottom[lane] as u16,
                 ],
                 depth: projected.depth[lane],
             };
+            if self.hierarchical && target.one_sample_hides(entry.rect, entry.depth) {
+                self.counters.nodes_culled += 1;
+                continue;
+            }
             self.open.push(entry, entry.depth.max(0.0));
         }
     }
@@ -209,7 +226,7 @@ impl<'a> Walk<'a> {
             Space::Group(group) => {
                 let item = &group.items[leaf as usize];
                 let (at, instance) = (c.at.after(&item.group_from_content), c.instance + item.first_instance);
-                self.enter(simd, item.content, at, instance);
+                self.enter(simd, target, item.content, at, instance);
             }
             Space::Mesh { blocks, mesh } => {
                 let block = &blocks.blocks[leaf as usize];
