@@ -126,17 +126,27 @@ fn draw_lane<S: Simd>(
     is_hole: &mut dyn FnMut(usize, i32, i32) -> bool,
     counts: &mut BlockCounts,
 ) {
-    let id = SurfaceId { instance: drawing.instance, triangle: block.triangle[lane] };
-    let masked = block.masked & (1 << lane) != 0;
-    let mut hole = |x: i32, y: i32| is_hole(lane, x, y);
-    let drawn = match (drawing.hierarchical, masked) {
-        (true, false) => fill::<S, true, false>(simd, target, triangle, id, &mut hole),
-        (true, true) => fill::<S, true, true>(simd, target, triangle, id, &mut hole),
-        (false, false) => fill::<S, false, false>(simd, target, triangle, id, &mut hole),
-        (false, true) => fill::<S, false, true>(simd, target, triangle, id, &mut hole),
+    let how = How {
+        id: SurfaceId { instance: drawing.instance, triangle: block.triangle[lane] },
+        hierarchical: drawing.hierarchical,
+        masked: block.masked & (1 << lane) != 0,
     };
+    let mut hole = |x: i32, y: i32| is_hole(lane, x, y);
+    // A function of its own: one copy of the code for each instruction set.
+    let drawn = simd.vectorize(
+        #[inline(always)]
+        || fill(simd, target, triangle, how, &mut hole),
+    );
     counts.drawn += u32::from(drawn.rasterised);
     counts.wrote |= drawn.wrote;
+}
+
+/// What a triangle's pixels get, and what may save work on the way.
+#[derive(Clone, Copy)]
+struct How {
+    id: SurfaceId,
+    hierarchical: bool,
+    masked: bool,
 }
 
 #[derive(Default)]
@@ -205,7 +215,7 @@ struct Filling<S: Simd> {
     /// Depth plane over window pixels.
     plane: [f64; 3],
     slot: u32,
-    id: SurfaceId,
+    how: How,
     wrote: bool,
 }
 
@@ -235,13 +245,14 @@ impl<S: Simd> Filling<S> {
 }
 
 #[inline(always)]
-fn fill<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
+fn fill<S: Simd>(
     simd: S,
     target: &mut Target,
     t: &ScreenTriangle,
-    id: SurfaceId,
+    how: How,
     is_hole: &mut dyn FnMut(i32, i32) -> bool,
 ) -> Filled {
+    let hierarchical = how.hierarchical;
     let left = (t.bounds.left - target.left) >> 2;
     let top = (t.bounds.top - target.top) >> 2;
     let right = (t.bounds.right - 1 - target.left) >> 2;
@@ -257,10 +268,10 @@ fn fill<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
             if !repeated {
                 let tile = (by >> 2) as usize * target.tiles_x + (bx >> 2) as usize;
                 let block = ((by & 3) * 4 + (bx & 3)) as usize;
-                if !HIERARCHICAL || t.depth_max >= target.block_minima(tile)[block] {
+                if !hierarchical || t.depth_max >= target.block_minima(tile)[block] {
                     blocks |= 1 << i;
                 }
-                if HIERARCHICAL && target.visits.is_some() {
+                if hierarchical && target.visits.is_some() {
                     target.count_polygon_visit((bx * 4, by * 4), 4, 1);
                 }
             }
@@ -286,7 +297,7 @@ fn fill<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
         depth_max: f32x16::splat(simd, t.depth_max),
         plane: t.plane,
         slot: target.surfaces.len() as u32,
-        id,
+        how,
         wrote: false,
     };
     let f = &mut filling;
@@ -295,41 +306,35 @@ fn fill<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
             let i = blocks.trailing_zeros() as i32;
             blocks &= blocks - 1;
             let (bx, by) = (if i & 1 == 0 { left } else { right }, if i & 2 == 0 { top } else { bottom });
-            fill_block::<S, HIERARCHICAL, MASKED>(simd, target, f, bx, by, false, is_hole);
+            fill_block(simd, target, f, bx, by, false, is_hole);
         }
     } else {
         let (left, top, right, bottom) = (left >> 2, top >> 2, right >> 2, bottom >> 2);
-        let large = right - left >= 6 || bottom - top >= 6;
-        if large {
-            for cell_y in top >> 2..=bottom >> 2 {
-                for cell_x in left >> 2..=right >> 2 {
-                    let within = cell_mask(
-                        (left - cell_x * 4).max(0),
-                        (top - cell_y * 4).max(0),
-                        (right - cell_x * 4).min(3),
-                        (bottom - cell_y * 4).min(3),
-                    );
-                    let mut tiles = within
-                        & tiles_of_cell::<S, HIERARCHICAL>(simd, target, f, t.depth_max, cell_x, cell_y);
-                    while tiles != 0 {
-                        let c = tiles.trailing_zeros() as i32;
-                        tiles &= tiles - 1;
-                        let (x, y) = (cell_x * 4 + (c & 3), cell_y * 4 + (c >> 2));
-                        fill_tile::<S, HIERARCHICAL, MASKED>(simd, target, f, t.depth_max, x, y, is_hole);
-                    }
+        // Cells whose tiles are few are taken whole.
+        let choose = right - left >= 6 || bottom - top >= 6;
+        for cell_y in top >> 2..=bottom >> 2 {
+            for cell_x in left >> 2..=right >> 2 {
+                let mut tiles = cell_mask(
+                    (left - cell_x * 4).max(0),
+                    (top - cell_y * 4).max(0),
+                    (right - cell_x * 4).min(3),
+                    (bottom - cell_y * 4).min(3),
+                );
+                if choose {
+                    tiles &= tiles_of_cell(simd, target, f, t.depth_max, cell_x, cell_y);
                 }
-            }
-        } else {
-            for y in top..=bottom {
-                for x in left..=right {
-                    fill_tile::<S, HIERARCHICAL, MASKED>(simd, target, f, t.depth_max, x, y, is_hole);
+                while tiles != 0 {
+                    let c = tiles.trailing_zeros() as i32;
+                    tiles &= tiles - 1;
+                    let (x, y) = (cell_x * 4 + (c & 3), cell_y * 4 + (c >> 2));
+                    fill_tile(simd, target, f, t.depth_max, x, y, is_hole);
                 }
             }
         }
     }
     let wrote = filling.wrote;
     if wrote {
-        target.surfaces.push(id);
+        target.surfaces.push(how.id);
     }
     Filled { rasterised: true, wrote }
 }
@@ -341,7 +346,7 @@ const ROW_F: [f32; 16] = [0., 0., 0., 0., 1., 1., 1., 1., 2., 2., 2., 2., 3., 3.
 
 /// Which of a 64-pixel cell's tiles the triangle may show in.
 #[inline(always)]
-fn tiles_of_cell<S: Simd, const HIERARCHICAL: bool>(
+fn tiles_of_cell<S: Simd>(
     simd: S,
     target: &mut Target,
     f: &Filling<S>,
@@ -358,7 +363,7 @@ fn tiles_of_cell<S: Simd, const HIERARCHICAL: bool>(
         outside |= steps + origin;
     }
     let mut tiles = !(outside.simd_lt(i32x16::splat(simd, 0)).to_bitmask() as u32) & 0xFFFF;
-    if HIERARCHICAL {
+    if f.how.hierarchical {
         let z = f.plane_at(target, cell_x * 64, cell_y * 64);
         let bound = z + f.plane_rise(15.0) + f.plane_margin(z, 63.0);
         let bounds = (f.depth_steps * 16.0 + bound).min(f32x16::splat(simd, depth_max));
@@ -367,14 +372,14 @@ fn tiles_of_cell<S: Simd, const HIERARCHICAL: bool>(
             tiles &= bounds.simd_ge(minima).to_bitmask() as u32;
         }
     }
-    if target.visits.is_some() && HIERARCHICAL {
+    if target.visits.is_some() && f.how.hierarchical {
         target.count_polygon_visit((cell_x * 64, cell_y * 64), 16, 0xFFFF);
     }
     tiles
 }
 
 #[inline(always)]
-fn fill_tile<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
+fn fill_tile<S: Simd>(
     simd: S,
     target: &mut Target,
     f: &mut Filling<S>,
@@ -396,7 +401,7 @@ fn fill_tile<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
     let zero = i32x16::splat(simd, 0);
     let mut blocks = !(outside.simd_lt(zero).to_bitmask() as u32) & 0xFFFF;
     let whole = !(partial.simd_lt(zero).to_bitmask() as u32);
-    if HIERARCHICAL {
+    if f.how.hierarchical {
         let z = f.plane_at(target, x, y);
         let bound = z + f.plane_rise(3.0) + f.plane_margin(z, 15.0);
         let bounds = (f.depth_steps * 4.0 + bound).min(f32x16::splat(simd, depth_max));
@@ -410,12 +415,12 @@ fn fill_tile<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
         let c = blocks.trailing_zeros() as i32;
         blocks &= blocks - 1;
         let (bx, by) = (tile_x * 4 + (c & 3), tile_y * 4 + (c >> 2));
-        fill_block::<S, HIERARCHICAL, MASKED>(simd, target, f, bx, by, whole & (1 << c) != 0, is_hole);
+        fill_block(simd, target, f, bx, by, whole & (1 << c) != 0, is_hole);
     }
 }
 
 #[inline(always)]
-fn fill_block<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
+fn fill_block<S: Simd>(
     simd: S,
     target: &mut Target,
     f: &mut Filling<S>,
@@ -449,9 +454,10 @@ fn fill_block<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
     let mut write = z.simd_gt(old).to_bitmask() as u32 & covered;
     let tied = z.simd_eq(old).to_bitmask() as u32 & covered;
     if tied != 0 {
-        write |= win_ties(target, f.id, at, tied, z.simd_gt(f32x16::splat(simd, 0.0)).to_bitmask() as u32);
+        write |=
+            win_ties(target, f.how.id, at, tied, z.simd_gt(f32x16::splat(simd, 0.0)).to_bitmask() as u32);
     }
-    if MASKED {
+    if f.how.masked {
         let candidates = write;
         for p in (0..16).filter(|p| candidates & (1 << p) != 0) {
             if is_hole(target.left + x + (p & 3), target.top + y + (p >> 2)) {
@@ -470,7 +476,7 @@ fn fill_block<S: Simd, const HIERARCHICAL: bool, const MASKED: bool>(
     let ids: &mut Sixteen<u32> = &mut target.id[at];
     let old_ids = fearless_simd::u32x16::from_slice(simd, &ids.0);
     mask.select(fearless_simd::u32x16::splat(simd, f.slot), old_ids).store_slice(&mut ids.0);
-    if HIERARCHICAL {
+    if f.how.hierarchical {
         let min = new.reduce_min();
         target.raise_block_minimum(tile, block, min);
     }

@@ -1,0 +1,213 @@
+//! One scene, all algorithms, one truth: the hierarchical z-buffer equals the plain one in every id and
+//! every depth bit, whatever the window, the threads and the instruction set, and both agree with the
+//! brute-force witnesses of `reference`.
+
+use fearless_simd::Level;
+use glam::{DQuat, DVec3};
+use hither::conventions::View;
+use hither::reference::{Caster, Judgement, trouble, zbuffer};
+use hither::scene::{Content, Transform};
+use hither::{Algorithm, Frame, IndexOptions, RenderOptions, Renderer, Scene, SceneIndex, render};
+use proptest::prelude::*;
+
+/// Every instruction set this machine has, plain code included.
+fn levels() -> Vec<Level> {
+    let best = Level::new();
+    let mut levels = vec![best];
+    #[cfg(target_arch = "x86_64")]
+    {
+        levels.extend(best.as_avx2().map(Level::Avx2));
+        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
+        levels.extend(best.as_sse2().map(Level::Sse2));
+    }
+    levels
+}
+
+fn plain(level: Level) -> RenderOptions {
+    RenderOptions { algorithm: Algorithm::ZBuffer, level, ..RenderOptions::default() }
+}
+
+/// The first pixel at which two frames differ.
+fn difference(a: &Frame, b: &Frame) -> Option<String> {
+    for y in 0..a.view.height {
+        for x in 0..a.view.width {
+            let (p, q) = ((a.id(x, y), a.depth(x, y)), (b.id(x, y), b.depth(x, y)));
+            if p.0 != q.0 || p.1.to_bits() != q.1.to_bits() {
+                return Some(format!("pixel ({x}, {y}): {p:?} and {q:?}"));
+            }
+        }
+    }
+    None
+}
+
+fn index_of(scene: Scene) -> SceneIndex {
+    SceneIndex::build(scene, &IndexOptions::default())
+}
+
+fn check_everything(scene: Scene, view: &View) -> Result<(), String> {
+    let index = index_of(scene);
+    let truth = render(&index, view, &plain(Level::new())).map_err(|e| e.to_string())?;
+    for level in levels() {
+        let hzb = RenderOptions { level, ..RenderOptions::default() };
+        let variants = [
+            plain(level),
+            hzb,
+            RenderOptions { window_width: 16, ..hzb },
+            RenderOptions { window_width: 32, threads: 3, ..hzb },
+            RenderOptions { complexity: true, ..hzb },
+        ];
+        for options in variants {
+            let frame = render(&index, view, &options).map_err(|e| e.to_string())?;
+            if let Some(at) = difference(&truth, &frame) {
+                return Err(format!("{options:?} differs from the plain z-buffer: {at}"));
+            }
+        }
+    }
+    let caster = Caster::new(index.scene(), view);
+    for y in 0..view.height {
+        for x in 0..view.width {
+            let seen = truth.id(x, y).map(|id| (id, truth.depth(x, y)));
+            if let Judgement::Wrong(why) = caster.probe(x, y).judge(seen) {
+                return Err(why);
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn every_variant_agrees_on_troublesome_scenes() {
+    for seed in 0..120 {
+        check_everything(trouble::scene(seed), &trouble::view(seed))
+            .unwrap_or_else(|why| panic!("seed {seed}: {why}"));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn every_variant_agrees(scene_seed: u64, view_seed: u64) {
+        let checked = check_everything(trouble::scene(scene_seed), &trouble::view(view_seed));
+        prop_assert!(checked.is_ok(), "{}", checked.unwrap_err());
+    }
+}
+
+/// The textbook z-buffer snaps the same way and must cover the same pixels, except where its own clipping
+/// or an equal depth decides; the ray caster judges those.
+#[test]
+fn the_textbook_z_buffer_sees_the_same() {
+    let (mut same, mut other) = (0, 0);
+    for seed in 0..200 {
+        let (scene, view) = (trouble::scene(seed), trouble::view(seed));
+        let drawing = zbuffer::draw(&scene, &view);
+        let index = index_of(scene);
+        let frame = render(&index, &view, &RenderOptions::default()).unwrap();
+        for y in 0..view.height {
+            for x in 0..view.width {
+                let equal = drawing.seen(x, y).map(|s| s.0) == frame.id(x, y);
+                (same, other) = if equal { (same + 1, other) } else { (same, other + 1) };
+            }
+        }
+    }
+    assert!(other * 500 < same, "{other} pixels differ, {same} are the same");
+}
+
+#[test]
+fn moving_instances_and_reused_buffers_change_nothing() {
+    for seed in 0..40 {
+        let (scene, view) = (trouble::scene(seed), trouble::view(seed));
+        let nodes = scene.root_group().nodes.len() as u32;
+        let mut index = index_of(scene);
+        let mut renderers = [false, true].map(|coherence| (Renderer::new(), coherence));
+        for step in 0..6 {
+            let t = f64::from(step);
+            let moved = step % nodes;
+            index.set_transform(
+                moved,
+                Transform::Trs {
+                    translation: DVec3::new(t.sin() * 3.0, t * 0.3 - 1.0, t.cos() * 3.0 - 4.0),
+                    rotation: DQuat::from_rotation_y(t),
+                    scale: DVec3::new(1.0, if step == 3 { -1.0 } else { 1.0 }, 1.0),
+                },
+            );
+            index.validate();
+            let fresh = index_of(index.scene().clone());
+            let truth = render(&fresh, &view, &plain(Level::new())).unwrap();
+            for (renderer, coherence) in &mut renderers {
+                let options = RenderOptions { coherence: *coherence, ..RenderOptions::default() };
+                let frame = renderer.render(&index, &view, &options).unwrap();
+                if let Some(at) = difference(&truth, &frame) {
+                    panic!("seed {seed}, step {step}, coherence {coherence}: {at}");
+                }
+                renderer.recycle(frame);
+            }
+        }
+    }
+}
+
+#[test]
+fn coherence_changes_nothing_while_the_eye_moves() {
+    for seed in 0..40 {
+        let scene = trouble::scene(seed);
+        let index = index_of(scene);
+        let mut coherent = Renderer::new();
+        for step in 0..5 {
+            let mut view = trouble::view(seed);
+            view.view_from_world.translation += DVec3::new(0.2, -0.1, 0.3) * step as f64;
+            let truth = render(&index, &view, &plain(Level::new())).unwrap();
+            let options = RenderOptions {
+                coherence: true,
+                threads: 1 + step % 3,
+                window_width: 16 * (step as u32 % 2),
+                ..RenderOptions::default()
+            };
+            let frame = coherent.render(&index, &view, &options).unwrap();
+            if let Some(at) = difference(&truth, &frame) {
+                panic!("seed {seed}, step {step}: {at}");
+            }
+            coherent.recycle(frame);
+        }
+    }
+}
+
+/// A finely tessellated closed surface covers each pixel inside its outline exactly once from the front:
+/// no crack on a shared edge, no double hit.
+#[test]
+fn shared_edges_are_drawn_exactly_once() {
+    use hither::scene::{Mesh, Node, Primitive};
+    let mut mesh = Mesh::default();
+    let n = 37u32;
+    for j in 0..=n {
+        for i in 0..=n {
+            let wobble = |a: u32| (a.wrapping_mul(2_654_435_761) >> 20) as f32 / 4096.0 - 0.5;
+            let inner = i > 0 && i < n && j > 0 && j < n;
+            let (dx, dy) = if inner { (wobble(i * 97 + j), wobble(j * 89 + i)) } else { (0.0, 0.0) };
+            let at = |v: u32, d: f32| (v as f32 + d * 0.8) / n as f32 * 2.0 - 1.0;
+            mesh.positions.push(glam::Vec3::new(at(i, dx), at(j, dy), -2.0));
+        }
+    }
+    for j in 0..n {
+        for i in 0..n {
+            let v = |di, dj| (j + dj) * (n + 1) + i + di;
+            mesh.triangles.push([v(0, 0), v(1, 0), v(1, 1)]);
+            mesh.triangles.push([v(0, 0), v(1, 1), v(0, 1)]);
+        }
+    }
+    mesh.primitives = vec![Primitive { triangles: 0..mesh.triangles.len() as u32, material: None }];
+    let mut scene = Scene::new("sheet");
+    scene.meshes.push(mesh);
+    scene.groups[0].push(Node { content: Content::Mesh(0), ..Node::default() });
+    let index = index_of(scene);
+    for size in [(64, 64), (97, 61), (256, 200)] {
+        // The sheet fills the view exactly at distance 2, and more than fills it when nearer.
+        for fov in [0.7, 0.9, 2.0 * 0.5f64.atan() * 0.999] {
+            let projection = hither::conventions::Projection::Perspective { fov_y: fov, near: 0.1 };
+            let view = View::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, (size.1, size.1));
+            let frame = render(&index, &view, &plain(Level::new())).unwrap();
+            let pixels = u64::from(size.1) * u64::from(size.1);
+            assert_eq!(frame.counters.pixels_written, pixels, "size {size:?}, fov {fov}");
+            let holes = (0..size.1).flat_map(|y| (0..size.1).map(move |x| (x, y)));
+            assert_eq!(holes.filter(|&(x, y)| frame.id(x, y).is_none()).count(), 0);
+        }
+    }
+}
