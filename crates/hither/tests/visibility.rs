@@ -182,7 +182,7 @@ fn shared_edges_are_drawn_exactly_once() {
             let wobble = |a: u32| (a.wrapping_mul(2_654_435_761) >> 20) as f32 / 4096.0 - 0.5;
             let inner = i > 0 && i < n && j > 0 && j < n;
             let (dx, dy) = if inner { (wobble(i * 97 + j), wobble(j * 89 + i)) } else { (0.0, 0.0) };
-            let at = |v: u32, d: f32| (v as f32 + d * 0.8) / n as f32 * 2.0 - 1.0;
+            let at = |v: u32, d: f32| (v as f32 + d * 0.45) / n as f32 * 2.0 - 1.0;
             mesh.positions.push(glam::Vec3::new(at(i, dx), at(j, dy), -2.0));
         }
     }
