@@ -91,6 +91,7 @@ fn a_wrong_command_line_is_code_2() {
     refused(&["render", WORLD, "-o", "x.png", "--threads", "100000"], 2, &["100000", "--threads"]);
     refused(&["render", WORLD, "-o", "x.png", "-q", "-v"], 2, &["--quiet", "--verbose"]);
     refused(&["info"], 2, &["SCENE"]);
+    refused(&["info", ""], 2, &["empty"]);
     refused(&["world", "office"], 2, &["-o"]);
     refused(&["world", "office", "-o", "office.obj"], 2, &["office.obj", ".glb"]);
     assert!(!Path::new("x.png").exists());
