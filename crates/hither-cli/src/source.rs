@@ -14,7 +14,9 @@ pub fn open(name: &str, verbosity: Verbosity) -> Result<Scene, Failure> {
         return generate(spec, verbosity);
     }
     if name.is_empty() {
-        return Err(Failure::usage("the name of the scene is empty; name a file, or a world as world:office"));
+        return Err(Failure::usage(
+            "the name of the scene is empty; name a file, or a world as world:office",
+        ));
     }
     let path = Path::new(name);
     let spinner = verbosity.spinner(format!("reading {name}"));
