@@ -185,6 +185,27 @@ fn a_report_on_standard_output_is_nothing_but_json() {
     assert!(report["bounds"]["max"][0].as_f64().unwrap() > 0.0);
 }
 
+#[test]
+fn a_world_written_as_glb_is_the_same_scene_and_the_same_picture() {
+    let folder = Folder::new("world");
+    let (file, report) = (folder.path("office.glb"), folder.path("report.json"));
+    let output = done(&["world", "office?n=2", "-o", &file, "--json", &report]);
+    assert!(stderr(&output).contains("120,000 triangles in 8 instances"), "{}", stderr(&output));
+    let report: Value = serde_json::from_slice(&fs::read(&report).unwrap()).unwrap();
+    assert_eq!(report["schema"], "hither.world/1");
+    let text = stdout(&done(&["info", &file]));
+    for part in ["120,000 shown", "\"corridor\"", "\"walk\"", "10 s"] {
+        assert!(text.contains(part), "no `{part}` in {text}");
+    }
+    let picture = |scene: &str| {
+        let path = folder.path("walk.png");
+        let view = ["--camera", "walk", "--time", "4.5", "--shade", "depth", "--size", "64x48"];
+        done(&[&["render", scene, "-o", &path], &view[..]].concat());
+        fs::read(path).unwrap()
+    };
+    assert!(picture("world:office?n=2") == picture(&file));
+}
+
 /// A red wall with a hole that a camera-less view looks at, and oddities that are worth a warning each.
 const OBJ: &str = "\
 mtllib nowhere.mtl

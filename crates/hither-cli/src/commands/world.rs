@@ -34,7 +34,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     outputs::check_report(to)?;
     let scene = source::generate(name, verbosity)?;
     let spinner = verbosity.spinner(format!("writing {}", output.display()));
-    let written = write_glb(output, &scene);
+    let written = hither_io::write_glb(&scene, output);
     spinner.finish_and_clear();
     written?;
     let (triangles, instances) = (scene.instanced_triangle_count(), scene.instance_count());
@@ -61,8 +61,4 @@ fn list() -> String {
         }
     }
     text
-}
-
-fn write_glb(output: &std::path::Path, _: &hither::Scene) -> Result<(), Failure> {
-    Err(Failure::work(format!("{}: glTF cannot be written yet", output.display())))
 }
