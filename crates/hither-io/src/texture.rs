@@ -16,6 +16,37 @@ const FREE_PIXELS: u64 = 1 << 22;
 /// Beyond that, no more than the tightest packing of the other formats: 1-bit PNG under deflate, 8 × 1032.
 const MAX_PIXELS_PER_BYTE: u64 = 8256;
 
+/// The most pixels of all textures of a model together: 2 GiB decoded.
+const MAX_ALL_PIXELS: u64 = 1 << 29;
+
+/// What the textures of one model may still take.
+pub(crate) struct Budget {
+    pixels: u64,
+}
+
+impl Default for Budget {
+    fn default() -> Self {
+        Budget { pixels: MAX_ALL_PIXELS }
+    }
+}
+
+impl Budget {
+    /// Takes off what the image in `bytes` will need, or says that it is too much. An image whose size cannot
+    /// be told costs nothing: it cannot be decoded either.
+    pub(crate) fn pay(&mut self, bytes: &[u8]) -> Result<(), String> {
+        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+        let size = reader.ok().and_then(|r| r.into_dimensions().ok());
+        let pixels = size.map_or(0, |(width, height)| u64::from(width) * u64::from(height));
+        match self.pixels.checked_sub(pixels) {
+            Some(left) => {
+                self.pixels = left;
+                Ok(())
+            }
+            None => Err("all images together are larger than 2 GiB; make them smaller".into()),
+        }
+    }
+}
+
 /// Decodes a PNG, JPEG or WebP file; its first bytes decide which. On failure one line that says why.
 pub(crate) fn decode(name: &str, bytes: &[u8]) -> Result<Texture, String> {
     let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string());
@@ -69,6 +100,14 @@ pub(crate) mod tests {
         let texels = [[1, 2, 3, 4], [5, 6, 7, 8], [9, 10, 11, 12], [0, 0, 0, 0], [255; 4], [1; 4]];
         let texture = decode("t", &png_of(3, 2, &texels)).unwrap();
         assert_eq!((texture.width, texture.height, texture.texels.as_slice()), (3, 2, &texels[..]));
+    }
+
+    #[test]
+    fn all_textures_together_have_a_limit() {
+        let mut budget = Budget { pixels: 7 };
+        let image = png_of(3, 2, &[[0; 4]; 6]);
+        assert!(budget.pay(&image).is_ok() && budget.pay(b"no image").is_ok());
+        assert!(budget.pay(&image).is_err() && budget.pay(&png_of(1, 1, &[[0; 4]])).is_ok());
     }
 
     #[test]

@@ -10,13 +10,8 @@ use super::material::{Materials, base_texture};
 use super::uri;
 use crate::{Companions, texture};
 use hither::scene::Texture;
-use image::ImageReader;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::io::Cursor;
-
-/// All images of a file together, pixels: 2 GiB.
-const ALL_PIXELS: u64 = 1 << 29;
 
 /// The scene's textures, and which of them each of the document's textures is.
 pub(super) struct Textures {
@@ -51,10 +46,10 @@ impl Textures {
         let mut images: Vec<u32> = image_of.values().copied().collect();
         images.sort_unstable();
         images.dedup();
-        let mut pixels_left = ALL_PIXELS;
+        let mut budget = texture::Budget::default();
         let fetched: Vec<(u32, Result<Vec<u8>, Fault>)> = images
             .into_iter()
-            .map(|image| (image, fetch(buffers, image as usize, companions, &mut pixels_left)))
+            .map(|image| (image, fetch(buffers, image as usize, companions, &mut budget)))
             .collect();
         let decode = |(image, bytes): (u32, Result<Vec<u8>, Fault>)| {
             let name = name_of(document, image as usize);
@@ -117,12 +112,12 @@ fn image_of_texture(document: &Document, texture: Index) -> Result<u32, Fault> {
     Ok(image.0)
 }
 
-/// The bytes of an image, paid for from `pixels_left`.
+/// The bytes of an image, paid for from `budget`.
 fn fetch(
     buffers: &Buffers,
     image: usize,
     companions: &dyn Companions,
-    pixels_left: &mut u64,
+    budget: &mut texture::Budget,
 ) -> Result<Vec<u8>, Fault> {
     let source = &buffers.document().images[image];
     let bytes = match (&source.uri, source.buffer_view) {
@@ -130,13 +125,6 @@ fn fetch(
         (None, Some(view)) => buffers.view(view)?.to_vec(),
         (None, None) => return malformed("it has neither a URI nor a buffer view"),
     };
-    // A header that cannot be read makes decoding fail, which then says why.
-    let reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format();
-    let size = reader.ok().and_then(|r| r.into_dimensions().ok());
-    let pixels = size.map_or(0, |(width, height)| u64::from(width) * u64::from(height));
-    match pixels_left.checked_sub(pixels) {
-        Some(left) => *pixels_left = left,
-        None => return unsupported("all images together are larger than 2 GiB; make them smaller"),
-    }
+    budget.pay(&bytes).or_else(unsupported)?;
     Ok(bytes)
 }

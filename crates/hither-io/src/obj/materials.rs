@@ -7,7 +7,8 @@ use crate::text::{self, Lines, quoted};
 use crate::{srgb, texture};
 use glam::{DAffine2, DVec2, Vec4};
 use hither::scene::{AlphaMode, Filter, Material, Texture, TextureRef, Wrap};
-use std::collections::HashMap;
+use rayon::prelude::*;
+use std::collections::{HashMap, HashSet};
 
 /// The materials of a file.
 #[derive(Debug, Default)]
@@ -53,22 +54,22 @@ pub(super) fn load(
     // Where a name is stated twice, the later counts.
     let place: HashMap<&[u8], usize> =
         stated.iter().enumerate().map(|(i, m)| (m.name.as_slice(), i)).collect();
+    let used: Vec<Option<&Stated>> =
+        statements.materials.iter().map(|name| place.get(name.as_slice()).map(|&at| &stated[at])).collect();
+    let textures = Textures::load(used.iter().flatten().filter_map(|m| m.map.as_ref()), companions, oddities);
     let mut materials = Materials::default();
-    let mut textures = Textures { companions, found: HashMap::new(), list: Vec::new() };
-    for name in &statements.materials {
-        let found = place.get(name.as_slice()).map(|&at| {
-            let material = stated[at].material(&mut textures, oddities);
-            materials.list.push(material);
-            (materials.list.len() - 1) as u32
-        });
-        if found.is_none() {
+    for (name, stated) in statements.materials.iter().zip(used) {
+        let Some(stated) = stated else {
             oddities.note(
                 "undefined material",
                 || format!("material {}", quoted(name)),
                 || "it is not defined in a material library; its faces are white".into(),
             );
-        }
-        materials.of_name.push(found);
+            materials.of_name.push(None);
+            continue;
+        };
+        materials.of_name.push(Some(materials.list.len() as u32));
+        materials.list.push(stated.material(&textures));
     }
     materials.textures = textures.list;
     materials
@@ -168,14 +169,14 @@ impl Stated {
         }
     }
 
-    fn material(&self, textures: &mut Textures, oddities: &mut Oddities) -> Material {
+    fn material(&self, textures: &Textures) -> Material {
         let color = self.color.unwrap_or([1.0; 3]).map(|c| srgb::linear(f64::from(c.clamp(0.0, 1e6))) as f32);
         // Some software writes `Tr` with the meaning of `d`, but then `d` is there too.
         let alpha = self.dissolve.or(self.transparency.map(|t| 1.0 - t)).unwrap_or(1.0).clamp(0.0, 1.0);
         Material {
             name: String::from_utf8_lossy(&self.name).into_owned(),
             base_color: Vec4::new(color[0], color[1], color[2], alpha),
-            texture: self.map.as_ref().and_then(|map| textures.reference(map, oddities)),
+            texture: self.map.as_ref().and_then(|map| textures.reference(map)),
             alpha: if alpha < 1.0 { AlphaMode::Blend } else { AlphaMode::Opaque },
             double_sided: true,
         }
@@ -242,43 +243,53 @@ fn up_to_three(rest: &mut &[u8], missing: f64) -> DVec2 {
 }
 
 /// Textures by file name, each decoded once.
-struct Textures<'a> {
-    companions: &'a dyn Companions,
-    found: HashMap<Vec<u8>, Option<u32>>,
+struct Textures {
+    of_file: HashMap<Vec<u8>, u32>,
     list: Vec<Texture>,
 }
 
-impl Textures<'_> {
-    fn reference(&mut self, map: &Map, oddities: &mut Oddities) -> Option<TextureRef> {
-        let texture = match self.found.get(&map.file) {
-            Some(&known) => known,
-            None => {
-                let texture = self.decode(&map.file, oddities);
-                self.found.insert(map.file.clone(), texture);
-                texture
-            }
+impl Textures {
+    /// Loads the files one after another and decodes them at the same time.
+    fn load<'a>(
+        maps: impl Iterator<Item = &'a Map>,
+        companions: &dyn Companions,
+        oddities: &mut Oddities,
+    ) -> Textures {
+        let mut budget = texture::Budget::default();
+        let mut seen: HashSet<&[u8]> = HashSet::new();
+        let loaded: Vec<(&[u8], Result<Vec<u8>, String>)> = maps
+            .map(|map| map.file.as_slice())
+            .filter(|&file| seen.insert(file))
+            .map(|file| {
+                let bytes = companions.load(&String::from_utf8_lossy(file));
+                (file, bytes.and_then(|bytes| budget.pay(&bytes).map(|()| bytes)))
+            })
+            .collect();
+        let decode = |(file, bytes): (&'a [u8], Result<Vec<u8>, String>)| {
+            let name = String::from_utf8_lossy(file);
+            (file, bytes.and_then(|bytes| texture::decode(&name, &bytes)))
         };
-        let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
-        let (transform, wrap) = (map.transform(), [wrap; 2]);
-        texture.map(|texture| TextureRef { texture, transform, wrap, filter: Filter::Linear })
-    }
-
-    fn decode(&mut self, file: &[u8], oddities: &mut Oddities) -> Option<u32> {
-        let name = String::from_utf8_lossy(file);
-        let decoded = self.companions.load(&name).and_then(|bytes| texture::decode(&name, &bytes));
-        match decoded {
-            Ok(texture) => {
-                self.list.push(texture);
-                Some((self.list.len() - 1) as u32)
-            }
-            Err(reason) => {
-                oddities.note(
+        let decoded: Vec<(&[u8], Result<Texture, String>)> = loaded.into_par_iter().map(decode).collect();
+        let mut textures = Textures { of_file: HashMap::new(), list: Vec::new() };
+        for (file, texture) in decoded {
+            match texture {
+                Ok(texture) => {
+                    textures.of_file.insert(file.to_owned(), textures.list.len() as u32);
+                    textures.list.push(texture);
+                }
+                Err(reason) => oddities.note(
                     "texture",
                     || format!("texture {}", quoted(file)),
-                    || format!("{reason}; the surface is drawn without it"),
-                );
-                None
+                    || format!("{reason}; its surfaces are drawn without it"),
+                ),
             }
         }
+        textures
+    }
+
+    fn reference(&self, map: &Map) -> Option<TextureRef> {
+        let &texture = self.of_file.get(&map.file)?;
+        let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
+        Some(TextureRef { texture, transform: map.transform(), wrap: [wrap; 2], filter: Filter::Linear })
     }
 }

@@ -6,7 +6,7 @@ use crate::oddities::Oddities;
 use crate::srgb;
 use crate::text::{self, Lines, is_blank};
 use glam::{DVec3, Vec2, Vec3, Vec4};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// No texture coordinate, no normal.
 pub(super) const NONE: u32 = u32::MAX;
@@ -76,6 +76,7 @@ struct State {
     changed: bool,
     part_of_name: HashMap<String, u32>,
     material_of_name: HashMap<Vec<u8>, u32>,
+    known_libraries: HashSet<Vec<u8>>,
 }
 
 /// Reads all statements. What is left out is noted in `oddities`.
@@ -88,6 +89,7 @@ pub(super) fn parse(bytes: &[u8], oddities: &mut Oddities) -> Result<Statements,
         changed: true,
         part_of_name: HashMap::new(),
         material_of_name: HashMap::new(),
+        known_libraries: HashSet::new(),
     };
     let mut lines = Lines::continued(bytes);
     // `number()` borrows what the line borrows.
@@ -236,7 +238,7 @@ impl Statements {
                 state.changed = true;
             }
             b"mtllib" => {
-                if !self.libraries.iter().any(|known| known == rest) {
+                if state.known_libraries.insert(rest.to_owned()) {
                     self.libraries.push(rest.to_owned());
                 }
             }

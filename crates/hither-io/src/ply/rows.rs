@@ -266,8 +266,9 @@ impl Rows {
 }
 
 fn index(number: f64) -> u32 {
-    let is_index = number >= 0.0 && number < f64::from(NOWHERE) && number.fract() == 0.0;
-    if is_index { number as u32 } else { NOWHERE }
+    // What the cast rounds or clamps is not an index.
+    let index = number as u32;
+    if f64::from(index) == number { index } else { NOWHERE }
 }
 
 /// Reads the entries of a list.
