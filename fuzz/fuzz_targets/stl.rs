@@ -1,7 +1,7 @@
 //! STL files of either kind.
 #![no_main]
 
-use hither_fuzz::{check};
+use hither_fuzz::check;
 use std::path::Path;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
