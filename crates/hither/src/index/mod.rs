@@ -16,6 +16,7 @@ pub(crate) use tree::{Box3, Child, Slot, WideTree};
 
 use crate::scene::{Content, Scene, Transform};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How a scene is indexed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,8 +44,8 @@ pub struct SceneIndex {
     options: IndexOptions,
     pub(crate) meshes: Vec<MeshIndex>,
     pub(crate) groups: Vec<GroupIndex>,
-    /// Raised by every move, so that a renderer knows whether last frame's transforms still hold.
-    pub(crate) epoch: u64,
+    /// A number no other index of this process has, so that a renderer knows what it remembers.
+    pub(crate) serial: u64,
 }
 
 impl SceneIndex {
@@ -63,7 +64,7 @@ impl SceneIndex {
             });
             groups.push(index);
         }
-        let index = SceneIndex { scene, options: *options, meshes, groups, epoch: 0 };
+        let index = SceneIndex { scene, options: *options, meshes, groups, serial: next_serial() };
         if cfg!(debug_assertions) {
             index.validate();
         }
@@ -101,7 +102,6 @@ impl SceneIndex {
         let moved = group.update(&self.scene.groups[root], |c| content_bounds(&self.meshes, &self.groups, c));
         self.groups[root] = group;
         if moved > 0 {
-            self.epoch += 1;
             if cfg!(debug_assertions) {
                 self.validate();
             }
@@ -129,6 +129,11 @@ impl SceneIndex {
             group.validate(|c| content_bounds(&self.meshes, &self.groups, c));
         }
     }
+}
+
+fn next_serial() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 fn content_bounds(meshes: &[MeshIndex], groups: &[GroupIndex], content: Content) -> Box3 {

@@ -20,7 +20,7 @@
 
 use super::clip::clip;
 use super::pyramid::{Sixteen, Target, cell_mask};
-use super::setup::{Lanes, ScreenTriangle, TriangleBlock, set_up};
+use super::setup::{ScreenTriangle, TriangleBlock, set_up};
 use super::transform::ScreenFromObject;
 use crate::conventions::SurfaceId;
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
@@ -62,7 +62,8 @@ pub fn draw_block<S: Simd>(
         right: target.left + target.width,
         bottom: target.top + target.height,
     };
-    let lanes: Lanes = set_up(simd, block, drawing.at, window);
+    let mut lanes = target.lanes.take().unwrap_or_default();
+    set_up(simd, block, drawing.at, window, &mut lanes);
     let mut counts = BlockCounts { front_facing: lanes.front_facing.count_ones(), drawn: 0, wrote: false };
     let mut rest = lanes.draw;
     while rest != 0 {
@@ -80,6 +81,7 @@ pub fn draw_block<S: Simd>(
     if lanes.clip != 0 {
         draw_clipped(simd, target, block, drawing, lanes.clip, is_hole, &mut counts);
     }
+    target.lanes = Some(lanes);
     counts
 }
 

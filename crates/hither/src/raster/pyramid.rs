@@ -8,6 +8,7 @@
 //! pixels. Pixels beyond the image's right and bottom border hold +∞: nothing is drawn there, and they
 //! never hold a minimum down.
 
+use super::setup::Lanes;
 use crate::conventions::SurfaceId;
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
@@ -74,6 +75,8 @@ pub struct Target {
     /// What the numbers in `id` stand for.
     pub(super) surfaces: Vec<SurfaceId>,
     pub(crate) visits: Option<Box<Visits>>,
+    /// Room for the triangles being set up.
+    pub(super) lanes: Option<Box<Lanes>>,
 }
 
 impl Target {
@@ -115,6 +118,7 @@ impl Target {
             levels,
             surfaces: Vec::new(),
             visits: None,
+            lanes: None,
         };
         target.clear();
         target

@@ -65,7 +65,9 @@ pub(super) struct ScreenTriangle {
     pub depth_max: f32,
 }
 
-/// Sixteen set-up triangles; lanes outside `draw` are meaningless.
+/// Sixteen set-up triangles; lanes outside `draw` are meaningless. Kept from block to block: filling a
+/// kilobyte with zeros first costs as much as a tenth of the setup.
+#[derive(Debug)]
 pub(super) struct Lanes {
     x: [Sixteen<i32>; 3],
     y: [Sixteen<i32>; 3],
@@ -86,9 +88,30 @@ pub(super) struct Lanes {
     pub front_facing: u16,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Half([f64; 8]);
+
+impl Default for Lanes {
+    fn default() -> Lanes {
+        let whole = Sixteen([0; 16]);
+        Lanes {
+            x: [whole; 3],
+            y: [whole; 3],
+            left: whole,
+            top: whole,
+            right: whole,
+            bottom: whole,
+            plane: [[Half([0.0; 8]); 2]; 3],
+            depth_min: Sixteen([0.0; 16]),
+            depth_max: Sixteen([0.0; 16]),
+            draw: 0,
+            single: 0,
+            clip: 0,
+            front_facing: 0,
+        }
+    }
+}
 
 impl Lanes {
     #[inline(always)]
@@ -126,7 +149,13 @@ struct Eight<S: Simd> {
 const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
 
 #[inline(always)]
-pub(super) fn set_up<S: Simd>(simd: S, block: &TriangleBlock, at: &ScreenFromObject, window: Rect) -> Lanes {
+pub(super) fn set_up<S: Simd>(
+    simd: S,
+    block: &TriangleBlock,
+    at: &ScreenFromObject,
+    window: Rect,
+    lanes: &mut Lanes,
+) {
     let halves = widen_corners(simd, block);
     let low = project(simd, &halves[0], at);
     let high = project(simd, &halves[1], at);
@@ -149,23 +178,12 @@ pub(super) fn set_up<S: Simd>(simd: S, block: &TriangleBlock, at: &ScreenFromObj
     let holds_a_centre = (left.simd_le(right) & top.simd_le(bottom)).to_bitmask() as u16;
     let draw = facing & holds_a_centre;
 
-    let mut lanes = Lanes {
-        x: [Sixteen([0; 16]); 3],
-        y: [Sixteen([0; 16]); 3],
-        left: store(left),
-        top: store(top),
-        right: store(right),
-        bottom: store(bottom),
-        plane: [[Half([0.0; 8]); 2]; 3],
-        depth_min: Sixteen([0.0; 16]),
-        depth_max: Sixteen([0.0; 16]),
-        draw,
-        single: 0,
-        clip,
-        front_facing: facing,
-    };
+    lanes.clip = clip;
+    lanes.front_facing = facing;
+    lanes.draw = draw;
+    lanes.single = 0;
     if draw == 0 {
-        return lanes;
+        return;
     }
 
     // Corners 1 and 2 change places where that makes the area positive.
@@ -177,11 +195,17 @@ pub(super) fn set_up<S: Simd>(simd: S, block: &TriangleBlock, at: &ScreenFromObj
         lanes.single = single & covers_pixel(simd, &x, &y, left, top);
         lanes.draw &= !single | lanes.single;
         if lanes.draw == 0 {
-            return lanes;
+            return;
         }
     }
-    lanes.x = [store(x[0]), store(x[1]), store(x[2])];
-    lanes.y = [store(y[0]), store(y[1]), store(y[2])];
+    for k in 0..3 {
+        x[k].store_slice(&mut lanes.x[k].0);
+        y[k].store_slice(&mut lanes.y[k].0);
+    }
+    left.store_slice(&mut lanes.left.0);
+    top.store_slice(&mut lanes.top.0);
+    right.store_slice(&mut lanes.right.0);
+    bottom.store_slice(&mut lanes.bottom.0);
     let planes = [depth_plane(simd, &low), depth_plane(simd, &high)];
     for (i, plane) in lanes.plane.iter_mut().enumerate() {
         for half in 0..2 {
@@ -193,7 +217,6 @@ pub(super) fn set_up<S: Simd>(simd: S, block: &TriangleBlock, at: &ScreenFromObj
     let d2 = simd.narrow_f64x8(low.d[2], high.d[2]);
     d0.min(d1).min(d2).store_slice(&mut lanes.depth_min.0);
     d0.max(d1).max(d2).store_slice(&mut lanes.depth_max.0);
-    lanes
 }
 
 #[inline(always)]
@@ -323,11 +346,4 @@ fn to_i32<S: Simd>(simd: S, low: &[f64x8<S>; 3], high: &[f64x8<S>; 3]) -> [i32x1
 #[inline(always)]
 fn sixteen_bits(low: u64, high: u64) -> u16 {
     low as u16 | (high as u16) << 8
-}
-
-#[inline(always)]
-fn store<S: Simd>(v: i32x16<S>) -> Sixteen<i32> {
-    let mut out = Sixteen([0; 16]);
-    v.store_slice(&mut out.0);
-    out
 }

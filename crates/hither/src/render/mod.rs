@@ -61,6 +61,9 @@ impl Default for RenderOptions {
 #[derive(Debug, Default)]
 pub struct Renderer {
     spare: Vec<Target>,
+    memories: Vec<walk::Memory>,
+    /// Which index and which windows `memories` speak of.
+    remembered: (u64, Vec<u32>),
 }
 
 impl Renderer {
@@ -86,12 +89,15 @@ impl Renderer {
         for window in &mut windows {
             window.record_visits(options.complexity);
         }
-        let draw = |w: &mut Target| walk::draw_window(options.level, index, view, options.algorithm, w);
-        let counts: Vec<Counters> = if threads == 1 || windows.len() == 1 {
-            windows.iter_mut().map(draw).collect()
-        } else {
-            in_parallel(threads, &mut windows, draw)
+        let draw = |(window, memory): Work| {
+            walk::draw_window(options.level, index, view, options.algorithm, window, memory)
         };
+        let coherent = options.coherence && options.algorithm == Algorithm::Hzb;
+        self.prepare_memories(coherent, index, &columns);
+        let memories = self.memories.iter_mut().map(Some).chain(std::iter::repeat_with(|| None));
+        let work = windows.iter_mut().zip(memories);
+        let counts: Vec<Counters> =
+            if threads == 1 { work.map(draw).collect() } else { in_parallel(threads, work, draw) };
         let mut counters = Counters::default();
         for c in counts {
             counters += c;
@@ -106,6 +112,22 @@ impl Renderer {
     /// Takes a frame's buffers back for the next one.
     pub fn recycle(&mut self, frame: Frame) {
         self.spare = frame.windows;
+    }
+
+    /// One memory a window if the frame is to be coherent, none otherwise.
+    fn prepare_memories(&mut self, coherent: bool, index: &SceneIndex, columns: &[u32]) {
+        if !coherent {
+            self.memories.clear();
+            return;
+        }
+        if self.memories.len() != columns.len()
+            || self.remembered.0 != index.serial
+            || self.remembered.1 != columns
+        {
+            self.memories.clear();
+            self.memories.resize_with(columns.len(), walk::Memory::default);
+            self.remembered = (index.serial, columns.to_vec());
+        }
     }
 
     fn take_windows(&mut self, view: &View, columns: &[u32]) -> Vec<Target> {
@@ -146,13 +168,16 @@ fn window_columns(view: &View, threads: usize, window_width: u32) -> Vec<u32> {
 /// More windows balance the load, but each walks the tree anew.
 const WINDOWS_A_THREAD: u32 = 2;
 
+/// A window to be drawn, and what it showed last time.
+type Work<'a> = (&'a mut Target, Option<&'a mut walk::Memory>);
+
 /// Workers take the next window until none is left.
-fn in_parallel(
+fn in_parallel<'a>(
     threads: usize,
-    windows: &mut [Target],
-    draw: impl Fn(&mut Target) -> Counters + Sync,
+    work: impl Iterator<Item = Work<'a>> + Send,
+    draw: impl Fn(Work) -> Counters + Sync,
 ) -> Vec<Counters> {
-    let queue = std::sync::Mutex::new(windows.iter_mut());
+    let queue = std::sync::Mutex::new(work);
     let work = || {
         let mut total = Counters::default();
         loop {

@@ -25,6 +25,7 @@ const SHIFT: u32 = 23 - FINE;
 const OCTAVES: u32 = 24;
 const BUCKETS: usize = (OCTAVES << FINE) as usize + 2;
 
+#[inline(always)]
 fn bucket_of(depth: f32) -> usize {
     let one = 1.0f32.to_bits() >> SHIFT;
     let at = depth.to_bits() >> SHIFT;

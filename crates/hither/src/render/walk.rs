@@ -12,19 +12,24 @@
 //! The order only saves work: whatever it is, the window ends up the same (see `raster`). Entries are
 //! tested when they are taken, not when they are pushed, so that what was drawn meanwhile counts.
 //!
+//! With a [`Memory`], the blocks that showed in the last frame are drawn first and the walk only fills in
+//! what has come into view. A block is remembered as long as the walk finds it in an open leaf.
+//!
 //! The plain z-buffer is the same walk with every test against the pyramid left out: it visits all that
 //! lies in the frustum and draws all of it.
 
 use super::queue::NearestFirst;
 use super::{Algorithm, Counters};
 use crate::conventions::View;
-use crate::index::{BlockTree, Child, GroupIndex, SceneIndex, Slot, WideTree};
+use crate::index::{BlockTree, Box3, Child, GroupIndex, SceneIndex, Slot, WideTree};
 use crate::raster::{
-    BoxSet, Drawing, ProjectedBoxes, Rect, ScreenFromObject, Target, draw_block, project_boxes,
+    BoxSet, Drawing, ProjectedBoxes, Rect, ScreenFromObject, Target, TriangleBlock, draw_block, project_boxes,
 };
 use crate::scene::{Content, Scene};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::DVec3;
+use std::collections::HashSet;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// Draws what `index` shows of `view` into one window.
 pub(super) fn draw_window(
@@ -33,8 +38,9 @@ pub(super) fn draw_window(
     view: &View,
     algorithm: Algorithm,
     target: &mut Target,
+    memory: Option<&mut Memory>,
 ) -> Counters {
-    dispatch!(level, simd => walk(simd, index, view, algorithm, target))
+    dispatch!(level, simd => walk(simd, index, view, algorithm, target, memory))
 }
 
 /// A tree entered with a transform.
@@ -66,9 +72,16 @@ struct Entry {
 struct Walk<'a> {
     index: &'a SceneIndex,
     contexts: Vec<Context<'a>>,
+    /// Bounds of the meshes' and the groups' trees entered so far.
+    mesh_bounds: Vec<Option<Box3>>,
+    group_bounds: Vec<Option<Box3>>,
     open: NearestFirst<Entry>,
     window: Rect,
     hierarchical: bool,
+    /// Blocks drawn from memory before the walk.
+    drawn: HashSet<Block, BuildHasherDefault<BlockHasher>>,
+    /// Blocks that show, if they are to be remembered.
+    seen: Option<Vec<Block>>,
     counters: Counters,
 }
 
@@ -79,6 +92,7 @@ fn walk<S: Simd>(
     view: &View,
     algorithm: Algorithm,
     target: &mut Target,
+    memory: Option<&mut Memory>,
 ) -> Counters {
     let window = Rect {
         left: target.left,
@@ -88,13 +102,21 @@ fn walk<S: Simd>(
     };
     let mut walk = Walk {
         index,
-        contexts: Vec::with_capacity(16),
+        contexts: Vec::with_capacity(256),
+        mesh_bounds: vec![None; index.meshes.len()],
+        group_bounds: vec![None; index.groups.len()],
         open: NearestFirst::new(),
         window,
         hierarchical: algorithm == Algorithm::Hzb,
+        drawn: HashSet::default(),
+        seen: None,
         counters: Counters::default(),
     };
     let root = index.scene().root;
+    if let Some(memory) = &memory {
+        walk.draw_remembered(simd, target, memory, ScreenFromObject::of_view(view));
+        walk.seen = Some(Vec::with_capacity(memory.seen.len() + 64));
+    }
     walk.enter(simd, target, Content::Group(root), ScreenFromObject::of_view(view), 0);
     while let Some(entry) = walk.open.pop() {
         if walk.hierarchical && target.hides(simd, rect_of(&entry), entry.depth) {
@@ -107,6 +129,9 @@ fn walk<S: Simd>(
         }
     }
     walk.counters.pixels_written = target.counters.pixels_written;
+    if let (Some(memory), Some(seen)) = (memory, walk.seen.take()) {
+        memory.seen = seen;
+    }
     walk.counters
 }
 
@@ -135,19 +160,24 @@ impl<'a> Walk<'a> {
         let (space, bounds) = match content {
             Content::Mesh(mesh) => {
                 let blocks = &self.index.meshes[mesh as usize].solid;
-                (Space::Mesh { blocks, mesh }, blocks.tree.bounds())
+                (Space::Mesh { blocks, mesh }, &mut self.mesh_bounds[mesh as usize])
             }
             Content::Group(g) => {
                 let group = &self.index.groups[g as usize];
-                (Space::Group(group), group.bounds())
+                (Space::Group(group), &mut self.group_bounds[g as usize])
             }
             Content::Nothing => return,
         };
+        let bounds = bounds.get_or_insert_with(|| match space {
+            Space::Mesh { blocks, .. } => blocks.tree.bounds(),
+            Space::Group(group) => group.bounds(),
+        });
         if bounds.is_empty() {
             return;
         }
+        let reach = bounds.reach();
         let context = self.contexts.len() as u32;
-        self.contexts.push(Context { space, at, boxes: BoxSet::new(&at, bounds.reach()), instance });
+        self.contexts.push(Context { space, at, boxes: BoxSet::new(&at, reach), instance });
         match space {
             Space::Mesh { .. } => self.visit_node(simd, target, context, false, 0),
             Space::Group(group) => {
@@ -229,21 +259,130 @@ impl<'a> Walk<'a> {
                 self.enter(simd, target, item.content, at, instance);
             }
             Space::Mesh { blocks, mesh } => {
+                let this = Block { instance: c.instance, block: leaf };
+                if self.drawn.contains(&this) {
+                    self.seen.get_or_insert_default().push(this);
+                    return;
+                }
                 let block = &blocks.blocks[leaf as usize];
                 let scene = self.index.scene();
-                let mut is_hole = |lane: usize, x, y| {
-                    is_hole(scene, mesh, block.triangle[lane], &block.corners(lane), &c.at, x, y)
-                };
-                let drawing = Drawing { instance: c.instance, at: &c.at, hierarchical: self.hierarchical };
-                let counts = simd.vectorize(
-                    #[inline(always)]
-                    || draw_block(simd, target, block, &drawing, &mut is_hole),
-                );
-                self.counters.triangles_tested += u64::from(block.lanes.count_ones());
-                self.counters.triangles_front_facing += u64::from(counts.front_facing);
-                self.counters.triangles_drawn += u64::from(counts.drawn);
+                let (at, instance) = (&c.at, c.instance);
+                let drawing = Drawing { instance, at, hierarchical: self.hierarchical };
+                let wrote = draw(simd, target, &drawing, scene, mesh, block, &mut self.counters);
+                if let Some(seen) = &mut self.seen
+                    && wrote
+                {
+                    seen.push(this);
+                }
             }
         }
+    }
+
+    /// Draws what was visible last time, in that order, before anything is asked of the pyramid
+    /// [Greene 1995, §3.3.3].
+    #[inline(always)]
+    fn draw_remembered<S: Simd>(
+        &mut self,
+        simd: S,
+        target: &mut Target,
+        memory: &Memory,
+        root: ScreenFromObject,
+    ) {
+        let mut last: Option<(u32, u32, ScreenFromObject)> = None;
+        for &this in &memory.seen {
+            let found = match last {
+                Some(known) if known.0 == this.instance => Some(known),
+                _ => screen_from_instance(self.index, root, this.instance)
+                    .map(|(m, at)| (this.instance, m, at)),
+            };
+            let Some((_, mesh, at)) = found else { continue };
+            last = found;
+            let scene = self.index.scene();
+            let Some(block) = self.index.meshes[mesh as usize].solid.blocks.get(this.block as usize) else {
+                continue;
+            };
+            let drawing = Drawing { instance: this.instance, at: &at, hierarchical: self.hierarchical };
+            if draw(simd, target, &drawing, scene, mesh, block, &mut self.counters) {
+                self.drawn.insert(this);
+            }
+        }
+    }
+}
+
+/// Draws one block of triangles; returns whether a pixel was written.
+#[inline(always)]
+fn draw<S: Simd>(
+    simd: S,
+    target: &mut Target,
+    drawing: &Drawing,
+    scene: &Scene,
+    mesh: u32,
+    block: &TriangleBlock,
+    counters: &mut Counters,
+) -> bool {
+    let mut is_hole = |lane: usize, x, y| {
+        is_hole(scene, mesh, block.triangle[lane], &block.corners(lane), drawing.at, x, y)
+    };
+    // A function of its own: one copy of the code for each instruction set.
+    let counts = simd.vectorize(
+        #[inline(always)]
+        || draw_block(simd, target, block, drawing, &mut is_hole),
+    );
+    counters.triangles_tested += u64::from(block.lanes.count_ones());
+    counters.triangles_front_facing += u64::from(counts.front_facing);
+    counters.triangles_drawn += u64::from(counts.drawn);
+    counts.wrote
+}
+
+/// The mesh of an instance, and its transform with the very operations of the walk.
+fn screen_from_instance(
+    index: &SceneIndex,
+    root: ScreenFromObject,
+    instance: u32,
+) -> Option<(u32, ScreenFromObject)> {
+    let (mut at, mut rest) = (root, instance);
+    let mut group = index.scene().root;
+    loop {
+        let items = &index.groups[group as usize].items;
+        let item = items[..items.partition_point(|i| i.first_instance <= rest)].last()?;
+        at = at.after(&item.group_from_content);
+        rest -= item.first_instance;
+        match item.content {
+            Content::Mesh(mesh) => return (rest == 0).then_some((mesh, at)),
+            Content::Group(g) => group = g,
+            Content::Nothing => return None,
+        }
+    }
+}
+
+/// What a window showed last time.
+#[derive(Debug, Default)]
+pub(super) struct Memory {
+    seen: Vec<Block>,
+}
+
+/// A block of triangles of one instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Block {
+    instance: u32,
+    block: u32,
+}
+
+/// Mixes two 32-bit numbers; the table only needs them spread.
+#[derive(Default)]
+struct BlockHasher(u64);
+
+impl Hasher for BlockHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&b| self.write_u32(u32::from(b)));
+    }
+
+    fn write_u32(&mut self, n: u32) {
+        self.0 = (self.0.rotate_left(26) ^ u64::from(n)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     }
 }
 
