@@ -57,9 +57,9 @@ fn layers_tint_in_the_order_of_their_depth() {
 
 #[test]
 fn over_nothing_a_pane_is_translucent_and_premultiplied() {
-    let scene = scene(vec![glass(0.8, 0.4, 0.2, 0.5)], vec![(square(Some(0)), at(0.0, 0.0, 0.0))]);
+    let scene = scene(vec![glass(1.0, 0.0, 1.0, 0.5)], vec![(square(Some(0)), at(0.0, 0.0, 0.0))]);
     let image = picture(&scene, &front_view());
-    let expected = Vec4::new(0.4, 0.2, 0.1, 0.5) * white().truncate().extend(1.0);
+    let expected = Vec4::new(0.5, 0.0, 0.5, 0.5) * white().truncate().extend(1.0);
     assert!(close(centre(&image), expected));
     assert_eq!(image.pixels[0], [0.0; 4]);
 }

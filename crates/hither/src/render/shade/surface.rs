@@ -3,7 +3,7 @@
 //! Only instances that are seen are looked up, once a picture; a triangle's corners and normals are computed
 //! once for each run of pixels that show it.
 
-use super::light::Light;
+use super::light::{Light, exposed};
 use super::triangle::{Rays, TriangleInView};
 use crate::conventions::{SurfaceId, View};
 use crate::scene::{InstanceLocator, Scene, Surface, TexturePyramids};
@@ -144,7 +144,7 @@ impl<'a> SeenTriangle<'a> {
             None => self.face_light,
             Some(_) => setting.light.around(normal),
         };
-        base * (around + setting.light.ahead(normal, setting.rays.toward_eye(at))).extend(1.0)
+        exposed(base, around + setting.light.ahead(normal, setting.rays.toward_eye(at)))
     }
 }
 
