@@ -106,6 +106,7 @@ fn an_input_that_fails_is_code_1() {
     refused(&["info", "world:offices"], 1, &["offices", "office, "]);
     refused(&["info", "world:office?m=1"], 1, &["\"m\"", "n (1 to"]);
     refused(&["info", "world:office?n=0"], 1, &["n=0", "from 1 to"]);
+    refused(&["bench", "exakt"], 1, &["\"exakt\"", "exact"]);
     refused(&["world", "offices", "-o", &folder.path("x.glb")], 1, &["offices"]);
     refused(&["render", WORLD, "-o", &picture, "--camera", "attic"], 1, &["\"attic\"", "\"corridor\""]);
     refused(&["render", WORLD, "-o", &picture, "--animation", "run"], 1, &["\"run\"", "\"walk\""]);
@@ -153,7 +154,7 @@ fn the_report_says_what_was_done() {
     let report: Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
     let first_key = report.as_object().unwrap().keys().next().unwrap();
     assert_eq!((first_key.as_str(), &report["schema"]), ("schema", &"hither.render/1".into()));
-    assert!(report["engine_version"].is_string());
+    assert!(report["version"].is_string());
     assert_eq!(report["camera"]["name"], "walk");
     assert_eq!(report["triangles"], 15_000);
     assert_eq!((&report["width"], &report["height"]), (&32.into(), &24.into()));
@@ -276,6 +277,7 @@ fn worlds_are_listed_and_help_is_printed() {
     assert!(stdout(&done(&["world"])).contains("office"));
     assert!(stdout(&done(&["--help"])).contains("render"));
     assert!(stdout(&done(&["render", "--help"])).contains("--camera"));
+    assert!(stdout(&done(&["bench", "--help"])).contains("exact"));
     assert!(stdout(&done(&["--version"])).starts_with("hither "));
 }
 

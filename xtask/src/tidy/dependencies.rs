@@ -32,7 +32,7 @@ pub fn check(root: &Path) -> Result<Vec<Finding>> {
 }
 
 /// The workspace's packages as `cargo metadata` describes them.
-pub fn packages(root: &Path) -> Result<Vec<Value>> {
+fn packages(root: &Path) -> Result<Vec<Value>> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--format-version", "1"])
         .current_dir(root)

@@ -7,8 +7,6 @@ mod lengths;
 mod modules;
 mod rooms;
 
-pub use dependencies::packages;
-
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use std::process::Command;

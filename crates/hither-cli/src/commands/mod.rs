@@ -1,5 +1,6 @@
 //! The commands: each reads its options, lets the engine work, and says what came out.
 
+mod bench;
 mod demo;
 mod info;
 mod render;
@@ -18,6 +19,8 @@ pub enum Command {
     World(world::Arguments),
     /// What does it look like?
     Render(Box<render::Arguments>),
+    /// How fast, against what?
+    Bench(bench::Arguments),
 }
 
 /// Runs `command`, or the demonstration.
@@ -26,6 +29,7 @@ pub fn run(command: Option<Command>) -> Result<(), Failure> {
         Some(Command::Info(arguments)) => info::run(&arguments),
         Some(Command::World(arguments)) => world::run(&arguments),
         Some(Command::Render(arguments)) => render::run(&arguments),
+        Some(Command::Bench(arguments)) => bench::run(&arguments),
         None => demo::run(),
     }
 }

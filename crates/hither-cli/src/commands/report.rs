@@ -11,7 +11,7 @@ use std::time::Duration;
 pub fn opening(command: &str) -> Map<String, Value> {
     let mut report = Map::new();
     report.insert("schema".into(), format!("hither.{command}/1").into());
-    report.insert("engine_version".into(), hither::VERSION.into());
+    report.insert("version".into(), hither::VERSION.into());
     report
 }
 
