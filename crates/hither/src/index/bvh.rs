@@ -5,101 +5,96 @@
 //! the binning]. Leaves are sets of at most `leaf_size` primitives that are drawn together, so the
 //! heuristic counts *blocks* of that size, not primitives. Deterministic for any number of threads.
 
-use super::tree::{Box3, Slot, WideNode, WideTree};
-
-/// A primitive to be placed: its box and its number.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Primitive {
-    pub bounds: Box3,
-    pub index: u32,
-}
-
-impl Primitive {
-    /// Twice the box's centre along an axis.
-    #[inline(always)]
-    fn center2(&self, axis: usize) -> f32 {
-        self.bounds.min[axis] * 0.5 + self.bounds.max[axis] * 0.5
-    }
-}
-
-/// A tree and, for each of its leaves, the numbers of the primitives in it.
-pub(super) struct Built {
-    pub tree: WideTree,
-    pub order: Vec<u32>,
-    /// `order[leaf_start[i]..leaf_start[i + 1]]` is leaf i.
-    pub leaf_start: Vec<u32>,
-}
+use super::parts::{Built, Growing, Part, Primitive, bounds_of};
+use glam::Vec4;
+use rayon::prelude::*;
 
 const BINS: usize = 16;
 
-/// Ranges longer than this are split on two threads.
+/// Ranges longer than this are split on several threads.
 const PARALLEL: usize = 8192;
 
-enum Part {
-    Leaf { bounds: Box3, primitives: Vec<u32> },
-    Node { bounds: Box3, parts: Vec<Part> },
-}
+/// Primitives that one thread puts into bins at a time.
+const CHUNK: usize = 32_768;
 
-impl Part {
-    fn bounds(&self) -> &Box3 {
-        match self {
-            Part::Leaf { bounds, .. } | Part::Node { bounds, .. } => bounds,
-        }
-    }
-}
-
-/// Builds the tree over `primitives`, which are reordered. Cost: n log n.
+/// Builds the tree over `primitives`, which are reordered. `leaf_size` is a power of two. Cost: n log n.
 pub(super) fn build(primitives: &mut [Primitive], leaf_size: usize) -> Built {
-    let mut built = Built { tree: WideTree::default(), order: Vec::new(), leaf_start: vec![0] };
-    if primitives.is_empty() {
-        return built;
-    }
-    built.order.reserve(primitives.len());
+    Built::from_root((!primitives.is_empty()).then(|| part(primitives, leaf_size)))
+}
+
+/// As [`build`], for a list that is not empty and becomes part of a larger tree.
+pub(super) fn part(primitives: &mut [Primitive], leaf_size: usize) -> Part {
+    debug_assert!(leaf_size.is_power_of_two());
     let bounds = bounds_of(primitives);
-    let root = if primitives.len() <= leaf_size {
-        Part::Node { bounds, parts: vec![leaf(primitives, bounds)] }
-    } else {
-        node(primitives, bounds, leaf_size)
-    };
-    flatten(root, &mut built);
-    built
+    Range { start: 0, primitives, bounds }.into_part(leaf_size)
 }
 
-fn bounds_of(primitives: &[Primitive]) -> Box3 {
-    primitives.iter().fold(Box3::EMPTY, |b, p| b.union(&p.bounds))
+/// Consecutive primitives, and where they begin among their node's.
+struct Range<'a> {
+    start: usize,
+    primitives: &'a mut [Primitive],
+    bounds: Growing,
 }
 
-fn leaf(primitives: &[Primitive], bounds: Box3) -> Part {
-    Part::Leaf { bounds, primitives: primitives.iter().map(|p| p.index).collect() }
-}
-
-fn node(primitives: &mut [Primitive], bounds: Box3, leaf_size: usize) -> Part {
-    let mut ranges: Vec<(&mut [Primitive], Box3)> = vec![(primitives, bounds)];
-    while ranges.len() < 16 {
-        let largest = ranges
-            .iter()
-            .enumerate()
-            .filter(|(_, r)| r.0.len() > leaf_size)
-            .max_by(|(i, a), (j, b)| a.1.half_area().total_cmp(&b.1.half_area()).then(j.cmp(i)));
-        let Some((at, _)) = largest else { break };
-        let (range, bounds) = ranges.swap_remove(at);
-        let (left, right) = split(range, &bounds, leaf_size);
-        ranges.push(left);
-        ranges.push(right);
+impl Range<'_> {
+    fn into_part(self, leaf_size: usize) -> Part {
+        if self.primitives.len() <= leaf_size {
+            return Part::leaf(self.primitives, self.bounds.finish());
+        }
+        let bounds = self.bounds.finish();
+        Part::Node { bounds, parts: parts_of(self.into_sixteen(leaf_size), leaf_size) }
     }
-    let parts = parts_of(ranges, leaf_size);
-    Part::Node { bounds, parts }
 }
 
-fn parts_of(mut ranges: Vec<(&mut [Primitive], Box3)>, leaf_size: usize) -> Vec<Part> {
-    let work: usize = ranges.iter().map(|r| r.0.len()).sum();
+impl<'a> Range<'a> {
+    /// At most sixteen ranges, in their order.
+    fn into_sixteen(self, leaf_size: usize) -> Vec<Range<'a>> {
+        let mut ranges = Vec::with_capacity(16);
+        ranges.push((self.bounds.half_area(), self));
+        while ranges.len() < 16 {
+            let largest = ranges
+                .iter()
+                .enumerate()
+                .filter(|(_, (_, r))| r.primitives.len() > leaf_size)
+                .max_by(|(i, a), (j, b)| a.0.total_cmp(&b.0).then(j.cmp(i)));
+            let Some((at, _)) = largest else { break };
+            for half in ranges.swap_remove(at).1.split(leaf_size) {
+                ranges.push((half.bounds.half_area(), half));
+            }
+        }
+        ranges.sort_unstable_by_key(|(_, r)| r.start);
+        ranges.into_iter().map(|(_, r)| r).collect()
+    }
+
+    /// Splits a range of at least two primitives in two that are not empty.
+    fn split(self, leaf_size: usize) -> [Range<'a>; 2] {
+        let (middle, bounds) = match best_plane(self.primitives, leaf_size) {
+            Some((plane, bounds)) => (partition(self.primitives, |p| plane.is_before(p)), bounds),
+            None => {
+                // All centres coincide, or nothing tells the halves apart: cut the list.
+                let n = self.primitives.len();
+                let middle = (n / 2).next_multiple_of(leaf_size).min(n - 1);
+                let (left, right) = self.primitives.split_at(middle);
+                (middle, [bounds_of(left), bounds_of(right)])
+            }
+        };
+        let (left, right) = self.primitives.split_at_mut(middle);
+        [
+            Range { start: self.start, primitives: left, bounds: bounds[0] },
+            Range { start: self.start + middle, primitives: right, bounds: bounds[1] },
+        ]
+    }
+}
+
+fn parts_of(mut ranges: Vec<Range>, leaf_size: usize) -> Vec<Part> {
+    let work: usize = ranges.iter().map(|r| r.primitives.len()).sum();
     if ranges.len() > 1 && work > PARALLEL {
         // Halves of about equal work.
         let mut sum = 0;
         let middle = ranges
             .iter()
             .position(|r| {
-                sum += r.0.len();
+                sum += r.primitives.len();
                 sum * 2 >= work
             })
             .map_or(1, |i| (i + 1).min(ranges.len() - 1));
@@ -108,138 +103,175 @@ fn parts_of(mut ranges: Vec<(&mut [Primitive], Box3)>, leaf_size: usize) -> Vec<
         left.extend(right);
         return left;
     }
-    ranges
-        .into_iter()
-        .map(
-            |(range, bounds)| {
-                if range.len() <= leaf_size { leaf(range, bounds) } else { node(range, bounds, leaf_size) }
-            },
-        )
-        .collect()
+    ranges.into_iter().map(|range| range.into_part(leaf_size)).collect()
 }
 
+/// Which bin a centre falls into, on each axis.
 #[derive(Clone, Copy)]
-struct Bin {
-    bounds: Box3,
-    count: usize,
+struct Binning {
+    origin: Vec4,
+    /// Bins a unit; 0 on an axis along which centres do not differ, or by more or less than f32 can say.
+    scale: Vec4,
 }
 
-type Half<'a> = (&'a mut [Primitive], Box3);
-
-/// Splits a range of at least two primitives in two that are not empty.
-fn split<'a>(range: &'a mut [Primitive], bounds: &Box3, leaf_size: usize) -> (Half<'a>, Half<'a>) {
-    let middle = match best_plane(range, leaf_size) {
-        Some((axis, low, scale, bin)) => partition(range, |p| bin_of(p.center2(axis), low, scale) < bin),
-        None => {
-            // All centres coincide, or nothing tells the halves apart: cut the list.
-            (range.len() / 2).next_multiple_of(leaf_size).min(range.len() - 1)
-        }
-    };
-    let _ = bounds;
-    let (left, right) = range.split_at_mut(middle);
-    let (left_bounds, right_bounds) = (bounds_of(left), bounds_of(right));
-    ((left, left_bounds), (right, right_bounds))
-}
-
-#[inline(always)]
-fn bin_of(center: f32, low: f32, scale: f32) -> usize {
-    (((center - low) * scale) as usize).min(BINS - 1)
-}
-
-/// Axis, origin and scale of the bins, and the first bin of the right half; `None` if nothing splits.
-fn best_plane(range: &[Primitive], leaf_size: usize) -> Option<(usize, f32, f32, usize)> {
-    let mut low = [f32::INFINITY; 3];
-    let mut high = [f32::NEG_INFINITY; 3];
-    for p in range.iter() {
-        for axis in 0..3 {
-            let c = p.center2(axis);
-            low[axis] = low[axis].min(c);
-            high[axis] = high[axis].max(c);
-        }
+impl Binning {
+    fn over(centers: &Growing) -> Binning {
+        let scale = (centers.high - centers.low).to_array().map(|extent| {
+            let scale = BINS as f32 / extent;
+            if scale.is_finite() { scale } else { 0.0 }
+        });
+        Binning { origin: centers.low, scale: Vec4::from_array(scale) }
     }
-    let scale: [f32; 3] = std::array::from_fn(|i| BINS as f32 / (high[i] - low[i]));
-    let usable: [bool; 3] =
-        std::array::from_fn(|i| high[i] > low[i] && scale[i].is_finite() && scale[i] > 0.0);
-    let mut bins = [[Bin { bounds: Box3::EMPTY, count: 0 }; BINS]; 3];
-    for p in range.iter() {
-        for axis in 0..3 {
-            if usable[axis] {
-                let bin = &mut bins[axis][bin_of(p.center2(axis), low[axis], scale[axis])];
-                bin.count += 1;
-                bin.bounds = bin.bounds.union(&p.bounds);
+
+    #[inline(always)]
+    fn bins_of(&self, p: &Primitive) -> [usize; 3] {
+        let at = (p.center() - self.origin) * self.scale - 0.5;
+        let bits = (at.min(Vec4::splat(LAST)) + ROUND).to_array();
+        [0, 1, 2].map(|axis| bits[axis].to_bits() as usize % BINS)
+    }
+
+    /// The same for one axis, with the same operations.
+    #[inline(always)]
+    fn bin_of(&self, p: &Primitive, axis: usize) -> usize {
+        let at = (p.center_along(axis) - self.origin[axis]) * self.scale[axis] - 0.5;
+        let at = if at < LAST { at } else { LAST };
+        (at + ROUND).to_bits() as usize % BINS
+    }
+}
+
+/// Adding this rounds to a whole number and leaves it in the low bits.
+const ROUND: f32 = 12_582_912.0; // 1.5 · 2²³
+
+/// The last bin. Where an extent is beyond f32 a place may be no number; it then counts as this.
+const LAST: f32 = (BINS - 1) as f32;
+
+/// The boundary before bin `bin` of an axis.
+struct Plane {
+    binning: Binning,
+    axis: usize,
+    bin: usize,
+}
+
+impl Plane {
+    #[inline(always)]
+    fn is_before(&self, p: &Primitive) -> bool {
+        self.binning.bin_of(p, self.axis) < self.bin
+    }
+}
+
+#[derive(Clone)]
+struct Bins {
+    bounds: [[Growing; BINS]; 3],
+    count: [[u32; BINS]; 3],
+}
+
+impl Bins {
+    const EMPTY: Bins = Bins { bounds: [[Growing::EMPTY; BINS]; 3], count: [[0; BINS]; 3] };
+
+    fn add(&mut self, primitives: &[Primitive], binning: &Binning) {
+        for p in primitives {
+            let bins = binning.bins_of(p);
+            let bounds = Growing::around(p);
+            for (axis, bin) in bins.into_iter().enumerate() {
+                self.bounds[axis][bin] = self.bounds[axis][bin].union(&bounds);
+                self.count[axis][bin] += 1;
             }
         }
     }
-    let mut best: Option<(f64, usize, usize)> = None;
-    for axis in (0..3).filter(|&a| usable[a]) {
-        if let Some((cost, bin)) = best_bin(&bins[axis], leaf_size)
-            && best.is_none_or(|b| cost < b.0)
-        {
-            best = Some((cost, axis, bin));
+
+    fn merged(mut self, other: &Bins) -> Bins {
+        for axis in 0..3 {
+            for bin in 0..BINS {
+                self.bounds[axis][bin] = self.bounds[axis][bin].union(&other.bounds[axis][bin]);
+                self.count[axis][bin] += other.count[axis][bin];
+            }
         }
+        self
     }
-    best.map(|(_, axis, bin)| (axis, low[axis], scale[axis], bin))
 }
 
-fn best_bin(bins: &[Bin; BINS], leaf_size: usize) -> Option<(f64, usize)> {
-    let cost = |bounds: &Box3, count: usize| bounds.half_area() * count.div_ceil(leaf_size) as f64;
-    let mut right_cost = [0.0; BINS];
-    let mut sum = Bin { bounds: Box3::EMPTY, count: 0 };
-    for i in (1..BINS).rev() {
-        sum = Bin { bounds: sum.bounds.union(&bins[i].bounds), count: sum.count + bins[i].count };
-        right_cost[i] = if sum.count > 0 { cost(&sum.bounds, sum.count) } else { f64::INFINITY };
+/// The cheapest plane and the bounds of what lies on either side; `None` if no plane separates anything.
+fn best_plane(primitives: &[Primitive], leaf_size: usize) -> Option<(Plane, [Growing; 2])> {
+    let binning = Binning::over(&centers_of(primitives));
+    let mut bins = Bins::EMPTY;
+    if primitives.len() > 2 * CHUNK {
+        // What the chunks' bins come to does not depend on who fills them.
+        let parts: Vec<Bins> = primitives
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let mut bins = Bins::EMPTY;
+                bins.add(chunk, &binning);
+                bins
+            })
+            .collect();
+        bins = parts.iter().fold(bins, Bins::merged);
+    } else {
+        bins.add(primitives, &binning);
     }
-    let mut best: Option<(f64, usize)> = None;
-    let mut left = Bin { bounds: Box3::EMPTY, count: 0 };
+    let mut best: Option<Split> = None;
+    for axis in (0..3).filter(|&axis| binning.scale[axis] > 0.0) {
+        best = cheaper_split(&bins, axis, leaf_size, best);
+    }
+    best.map(|b| (Plane { binning, axis: b.axis, bin: b.bin }, b.bounds))
+}
+
+fn centers_of(primitives: &[Primitive]) -> Growing {
+    let around = |chunk: &[Primitive]| {
+        chunk.iter().fold(Growing::EMPTY, |b, p| b.union(&Growing::of_point(p.center())))
+    };
+    if primitives.len() > 2 * CHUNK {
+        let parts: Vec<Growing> = primitives.par_chunks(CHUNK).map(around).collect();
+        return parts.iter().fold(Growing::EMPTY, |b, p| b.union(p));
+    }
+    around(primitives)
+}
+
+struct Split {
+    cost: f64,
+    axis: usize,
+    bin: usize,
+    bounds: [Growing; 2],
+}
+
+/// `best`, or a cheaper split along `axis`: surface times number of leaves, summed over both sides.
+fn cheaper_split(bins: &Bins, axis: usize, leaf_size: usize, mut best: Option<Split>) -> Option<Split> {
+    let (bounds, count) = (&bins.bounds[axis], &bins.count[axis]);
+    let shift = leaf_size.trailing_zeros();
+    let cost = |b: &Growing, n: u32| b.half_area() * f64::from((n + leaf_size as u32 - 1) >> shift);
+    let mut right = [(f64::INFINITY, Growing::EMPTY); BINS];
+    let mut sum = (Growing::EMPTY, 0);
+    for i in (1..BINS).rev() {
+        if count[i] > 0 {
+            sum = (sum.0.union(&bounds[i]), sum.1 + count[i]);
+            // Where a bin is empty the next boundary is the same split.
+            right[i] = (cost(&sum.0, sum.1), sum.0);
+        }
+    }
+    let mut left = (Growing::EMPTY, 0);
     for i in 1..BINS {
-        left = Bin { bounds: left.bounds.union(&bins[i - 1].bounds), count: left.count + bins[i - 1].count };
-        if left.count == 0 || right_cost[i] == f64::INFINITY {
+        if count[i - 1] > 0 {
+            left = (left.0.union(&bounds[i - 1]), left.1 + count[i - 1]);
+        }
+        if left.1 == 0 || right[i].0 == f64::INFINITY {
             continue;
         }
-        let total = cost(&left.bounds, left.count) + right_cost[i];
-        if best.is_none_or(|b| total < b.0) {
-            best = Some((total, i));
+        let total = cost(&left.0, left.1) + right[i].0;
+        if best.as_ref().is_none_or(|b| total < b.cost) {
+            best = Some(Split { cost: total, axis, bin: i, bounds: [left.0, right[i].1] });
         }
     }
     best
 }
 
 /// Moves what satisfies `first` to the front and returns how many do.
+#[inline(always)]
 fn partition(range: &mut [Primitive], first: impl Fn(&Primitive) -> bool) -> usize {
     let mut front = 0;
     for i in 0..range.len() {
-        if first(&range[i]) {
-            range.swap(front, i);
-            front += 1;
-        }
+        // Always a swap: which way it goes cannot be foreseen, and a branch would be guessed wrongly.
+        let before = first(&range[i]);
+        range.swap(i, front);
+        front += usize::from(before);
     }
     front
-}
-
-fn flatten(root: Part, built: &mut Built) {
-    // (part, where its slot is)
-    let mut stack: Vec<(Part, Option<(usize, usize)>)> = vec![(root, None)];
-    while let Some((part, place)) = stack.pop() {
-        match part {
-            Part::Leaf { primitives, .. } => {
-                let leaf = built.leaf_start.len() - 1;
-                built.order.extend(&primitives);
-                built.leaf_start.push(built.order.len() as u32);
-                let (node, slot) = place.expect("the root is a node");
-                built.tree.nodes[node].child[slot] = Slot::leaf(leaf);
-            }
-            Part::Node { parts, .. } => {
-                let at = built.tree.nodes.len();
-                if let Some((node, slot)) = place {
-                    built.tree.nodes[node].child[slot] = Slot::node(at);
-                }
-                let mut wide = WideNode::EMPTY;
-                for part in &parts {
-                    wide.push(part.bounds(), Slot::EMPTY);
-                }
-                built.tree.nodes.push(wide);
-                stack.extend(parts.into_iter().enumerate().rev().map(|(slot, p)| (p, Some((at, slot)))));
-            }
-        }
-    }
 }

@@ -1,11 +1,15 @@
 //! A group of nodes made searchable: trees over its instances, one for what rests and one for what moves.
 //!
 //! An item that has moved once leaves the static tree for the dynamic one, which is refitted when its
-//! items move and rebuilt when refitting has let it grow loose [Greene 1995, §3.4]. Static parts are not
-//! touched again.
+//! items move and rebuilt when refitting has let it grow loose, or when an item joins it [Greene 1995, §3.4].
+//! Static parts are not touched again; a frame costs what moved in it.
 
-use super::bvh::{self, Primitive};
+use super::TreeKind;
+use super::parts::Primitive;
+use super::poses::Poses;
+use super::refit::Refit;
 use super::tree::{Box3, Child, Slot, WideTree};
+use super::{bvh, octree};
 use crate::scene::{Content, Group};
 use glam::DAffine3;
 
@@ -16,7 +20,7 @@ pub(crate) struct Item {
     pub content: Content,
     /// Number of its first instance, counted from the group's first.
     pub first_instance: u32,
-    /// Node of the group.
+    /// Node of the group. Items are in the order of their nodes.
     pub node: u32,
 }
 
@@ -25,41 +29,50 @@ pub(crate) struct GroupIndex {
     pub items: Vec<Item>,
     pub resting: WideTree,
     pub moving: WideTree,
+    kind: TreeKind,
     /// Where each item's slot is: in which tree, node and slot.
     places: Vec<Place>,
-    /// Items in `moving`.
-    movers: Vec<u32>,
-    /// Total box surface of `moving` when it was built.
-    built_area: f64,
+    /// Items in `resting`.
+    at_rest: usize,
+    /// What nothing needs before something moves.
+    motion: Option<Motion>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Place {
     moves: bool,
+    /// `NOWHERE` where there is nothing to be seen.
     node: u32,
     slot: u32,
 }
 
-/// The dynamic tree is rebuilt once its boxes have this many times the surface they were built with.
-const LOOSE: f64 = 1.5;
+const NOWHERE: u32 = u32::MAX;
+
+#[derive(Debug)]
+struct Motion {
+    poses: Poses,
+    /// Items in `moving`, and how to keep it around them.
+    movers: Vec<u32>,
+    refit: Refit,
+}
 
 impl GroupIndex {
     /// `content_bounds` gives the bounds of a mesh or group; `instances` how many instances it expands to.
     pub fn build(
         group: &Group,
+        kind: TreeKind,
         content_bounds: impl Fn(Content) -> Box3,
         instances: impl Fn(Content) -> u64,
     ) -> GroupIndex {
         let world = group.world_transforms();
         let mut first_instance = 0u64;
-        let mut index = GroupIndex::default();
+        let mut index = GroupIndex { kind, ..GroupIndex::default() };
         let mut primitives = Vec::new();
         for (n, node) in group.nodes.iter().enumerate() {
-            let bounds = content_bounds(node.content);
             if node.content != Content::Nothing {
-                let placed = placed_bounds(&bounds, &world[n]);
+                let placed = placed_bounds(&content_bounds(node.content), &world[n]);
                 if !placed.is_empty() {
-                    primitives.push(Primitive { bounds: placed, index: index.items.len() as u32 });
+                    primitives.push(Primitive::of_box(&placed, index.items.len() as u32));
                 }
                 index.items.push(Item {
                     group_from_content: world[n],
@@ -70,8 +83,9 @@ impl GroupIndex {
             }
             first_instance += instances(node.content);
         }
-        index.places = vec![Place { moves: false, node: u32::MAX, slot: 0 }; index.items.len()];
-        index.resting = tree_of_items(&mut primitives);
+        index.places = vec![Place { moves: false, node: NOWHERE, slot: 0 }; index.items.len()];
+        index.at_rest = primitives.len();
+        index.resting = tree_of_items(primitives, kind);
         record_places(&index.resting, &mut index.places, false);
         index
     }
@@ -81,84 +95,113 @@ impl GroupIndex {
     }
 
     pub fn memory_bytes(&self) -> usize {
+        let motion = self.motion.as_ref().map_or(0, |m| {
+            m.poses.memory_bytes() + size_of_val(m.movers.as_slice()) + m.refit.memory_bytes()
+        });
         size_of_val(self.items.as_slice())
             + size_of_val(self.places.as_slice())
             + size_of_val(self.resting.nodes.as_slice())
             + size_of_val(self.moving.nodes.as_slice())
+            + motion
     }
 
-    /// Follows the group's nodes to where they are now; returns how many items moved.
-    pub fn update(&mut self, group: &Group, content_bounds: impl Fn(Content) -> Box3) -> usize {
-        let world = group.world_transforms();
+    /// Follows the group's nodes to where they are now; returns how many items moved. `changed` lists all
+    /// nodes whose own transforms may have changed since the last call, ascending. Cost: their subtrees and
+    /// the boxes above what moved; the first time, all nodes; when items move that never did, all that ever
+    /// did.
+    pub fn update(
+        &mut self,
+        group: &Group,
+        changed: &[u32],
+        content_bounds: impl Fn(Content) -> Box3,
+    ) -> usize {
         let mut moved = Vec::new();
-        let mut joined = false;
-        for (i, item) in self.items.iter_mut().enumerate() {
-            let now = world[item.node as usize];
-            if now == item.group_from_content {
-                continue;
+        let motion = match &mut self.motion {
+            Some(motion) => {
+                let items = &mut self.items;
+                motion.poses.follow(group, changed, |node, now| {
+                    if let Ok(i) = items.binary_search_by_key(&(node as u32), |item| item.node) {
+                        items[i].group_from_content = *now;
+                        moved.push(i as u32);
+                    }
+                });
+                motion
             }
-            item.group_from_content = now;
-            if content_bounds(item.content).is_empty() {
-                continue;
+            none => {
+                let poses = Poses::new(group);
+                for (i, item) in self.items.iter_mut().enumerate() {
+                    let now = poses.world(item.node as usize);
+                    if item.group_from_content != *now {
+                        item.group_from_content = *now;
+                        moved.push(i as u32);
+                    }
+                }
+                none.insert(Motion { poses, movers: Vec::new(), refit: Refit::default() })
             }
-            moved.push(i as u32);
-            if !self.places[i].moves {
-                joined = true;
-                leave(&mut self.resting, self.places[i]);
-                self.places[i].moves = true;
-                self.movers.push(i as u32);
-            }
-        }
-        let bounds_now = |index: &GroupIndex, i: u32| {
-            let item = &index.items[i as usize];
+        };
+        moved.retain(|&i| self.places[i as usize].node != NOWHERE);
+        let bounds_now = |i: u32| {
+            let item = &self.items[i as usize];
             placed_bounds(&content_bounds(item.content), &item.group_from_content)
         };
-        if !joined && !moved.is_empty() {
-            for &i in &moved {
-                let bounds = bounds_now(self, i);
-                let place = self.places[i as usize];
-                let child = self.moving.nodes[place.node as usize].child[place.slot as usize];
-                self.moving.nodes[place.node as usize].set(place.slot as usize, &bounds, child);
+        let before = motion.movers.len();
+        for &i in &moved {
+            let place = &mut self.places[i as usize];
+            if !place.moves {
+                leave(&mut self.resting, *place);
+                self.at_rest -= 1;
+                place.moves = true;
+                motion.movers.push(i);
             }
-            refit(&mut self.moving);
         }
-        if joined || (!moved.is_empty() && total_area(&self.moving) > LOOSE * self.built_area) {
-            let mut primitives: Vec<Primitive> =
-                self.movers.iter().map(|&i| Primitive { bounds: bounds_now(self, i), index: i }).collect();
-            self.moving = tree_of_items(&mut primitives);
+        let joined = motion.movers.len() > before;
+        if joined && self.at_rest == 0 {
+            self.resting = WideTree::default();
+        }
+        if !joined {
+            let slots = moved.iter().map(|&i| {
+                let place = self.places[i as usize];
+                (place.node, place.slot, bounds_now(i))
+            });
+            motion.refit.set(&mut self.moving, slots);
+        }
+        if joined || motion.refit.is_loose() {
+            let primitives = motion.movers.iter().map(|&i| Primitive::of_box(&bounds_now(i), i)).collect();
+            self.moving = tree_of_items(primitives, self.kind);
             record_places(&self.moving, &mut self.places, true);
-            self.built_area = total_area(&self.moving);
+            motion.refit = Refit::new(&self.moving);
         }
         moved.len()
     }
 
-    pub fn validate(&self, content_bounds: impl Fn(Content) -> Box3) {
+    /// Asserts that every item is where `group` has it, and in one slot, whose box and all above contain it.
+    pub fn validate(&self, group: &Group, content_bounds: impl Fn(Content) -> Box3) {
+        let world = group.world_transforms();
+        let mut slots = vec![0; self.items.len()];
         for (tree, moves) in [(&self.resting, false), (&self.moving, true)] {
             for (n, node) in tree.nodes.iter().enumerate() {
-                for slot in 0..node.used as usize {
-                    if node.child[slot] == Slot::EMPTY {
-                        continue;
-                    }
-                    match node.child[slot].child() {
+                for slot in (0..node.used as usize).filter(|&s| node.child[s] != Slot::EMPTY) {
+                    let inner = match node.child[slot].child() {
                         Child::Leaf(i) => {
                             let item = &self.items[i as usize];
                             let place = self.places[i as usize];
-                            assert!(
-                                place.moves == moves
-                                    && place.node as usize == n
-                                    && place.slot as usize == slot
-                            );
-                            let bounds =
-                                placed_bounds(&content_bounds(item.content), &item.group_from_content);
-                            assert!(node.bounds_of(slot).contains(&bounds), "item {i} sticks out of its box");
+                            let found = (place.moves, place.node as usize, place.slot as usize);
+                            assert_eq!(found, (moves, n, slot), "item {i} is looked for elsewhere");
+                            slots[i as usize] += 1;
+                            placed_bounds(&content_bounds(item.content), &item.group_from_content)
                         }
-                        Child::Node(c) => {
-                            let inner = tree.nodes[c as usize].bounds();
-                            assert!(node.bounds_of(slot).contains(&inner), "node {c} sticks out of its box");
-                        }
-                    }
+                        Child::Node(c) => tree.nodes[c as usize].bounds(),
+                    };
+                    let outer = node.bounds_of(slot);
+                    assert!(outer.contains(&inner), "slot {slot} of node {n} is too small");
                 }
             }
+        }
+        for (i, item) in self.items.iter().enumerate() {
+            let seen = usize::from(!content_bounds(item.content).is_empty());
+            assert_eq!(slots[i], seen, "item {i} occurs {} times", slots[i]);
+            let now = world[item.node as usize];
+            assert!(item.group_from_content == now || now.is_nan(), "item {i} is out of place");
         }
     }
 }
@@ -177,8 +220,13 @@ fn placed_bounds(bounds: &Box3, transform: &DAffine3) -> Box3 {
     Box3::around(&crate::geometry::Aabb { min: placed.min - slack, max: placed.max + slack })
 }
 
-fn tree_of_items(primitives: &mut [Primitive]) -> WideTree {
-    let built = bvh::build(primitives, 1);
+/// A tree whose leaves are the primitives' numbers.
+fn tree_of_items(mut primitives: Vec<Primitive>, kind: TreeKind) -> WideTree {
+    let built = match kind {
+        TreeKind::Bvh => bvh::build(&mut primitives, 1),
+        // An item has one slot, where it is found when it moves: it is never shared by several cubes.
+        TreeKind::OctreeSmallest | TreeKind::OctreePushed => octree::build_smallest(primitives, 1),
+    };
     let mut tree = built.tree;
     for node in &mut tree.nodes {
         for slot in 0..node.used as usize {
@@ -203,25 +251,4 @@ fn record_places(tree: &WideTree, places: &mut [Place], moves: bool) {
 /// Empties a slot; the boxes above keep their size, which is still a bound.
 fn leave(tree: &mut WideTree, place: Place) {
     tree.nodes[place.node as usize].set(place.slot as usize, &Box3::EMPTY, Slot::EMPTY);
-}
-
-/// Recomputes every inner box from below: children come after their parents.
-fn refit(tree: &mut WideTree) {
-    for n in (0..tree.nodes.len()).rev() {
-        for slot in 0..tree.nodes[n].used as usize {
-            if tree.nodes[n].child[slot] == Slot::EMPTY {
-                continue;
-            }
-            if let Child::Node(c) = tree.nodes[n].child[slot].child() {
-                let bounds = tree.nodes[c as usize].bounds();
-                let child = tree.nodes[n].child[slot];
-                tree.nodes[n].set(slot, &bounds, child);
-            }
-        }
-    }
-}
-
-fn total_area(tree: &WideTree) -> f64 {
-    let slots = tree.nodes.iter().flat_map(|n| (0..n.used as usize).map(|s| n.bounds_of(s)));
-    slots.filter(|b| !b.is_empty()).map(|b| b.half_area()).sum()
 }

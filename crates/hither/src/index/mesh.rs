@@ -1,12 +1,13 @@
 //! A mesh made searchable: its triangles in blocks of sixteen, and trees over the blocks.
 
-use super::bvh::{self, Primitive};
-use super::octree;
+use super::parts::Primitive;
 use super::tree::{Box3, WideTree};
 use super::{IndexOptions, TreeKind};
+use super::{bvh, octree};
 use crate::raster::TriangleBlock;
 use crate::scene::{AlphaMode, Material, Mesh};
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// A tree whose leaves are blocks of triangles.
 #[derive(Debug, Default)]
@@ -31,18 +32,20 @@ impl MeshIndex {
             let blends = material.is_some_and(|m| m.alpha == AlphaMode::Blend);
             let list = if blends { &mut blended } else { &mut solid };
             for t in run.triangles.clone() {
-                let [a, b, c] = corners(mesh, t);
-                // Without area no pixel centre is covered, whatever the view.
-                if a == b || b == c || c == a {
-                    continue;
+                let corners = corners(mesh, t);
+                if has_area(&corners) {
+                    let [a, b, c] = corners;
+                    list.push(Primitive::new(a.min(b).min(c), a.max(b).max(c), t));
                 }
-                let (min, max) = (a.min(b).min(c), a.max(b).max(c));
-                let bounds = Box3 { min: min.to_array(), max: max.to_array() };
-                list.push(Primitive { bounds, index: t });
             }
         }
-        let tree = |list: &mut Vec<Primitive>| build_blocks(mesh, materials, list, options);
-        MeshIndex { solid: tree(&mut solid), blended: tree(&mut blended) }
+        // Blended triangles are never shared by leaves: each tints once.
+        let unshared =
+            if options.tree == TreeKind::OctreePushed { TreeKind::OctreeSmallest } else { options.tree };
+        MeshIndex {
+            solid: build_blocks(mesh, materials, solid, options.tree),
+            blended: build_blocks(mesh, materials, blended, unshared),
+        }
     }
 
     pub fn bounds(&self) -> Box3 {
@@ -56,14 +59,36 @@ impl MeshIndex {
             .sum()
     }
 
-    pub fn validate(&self, options: &IndexOptions) {
+    /// Asserts that the trees are sound and that every triangle that can be seen lies in one leaf, or, where
+    /// small ones are pushed down, in several.
+    pub fn validate(&self, mesh: &Mesh, options: &IndexOptions) {
+        let mut leaves = vec![0; mesh.triangles.len()];
         for t in [&self.solid, &self.blended] {
-            let shared = options.tree == TreeKind::OctreePushed;
-            t.tree.validate(t.blocks.len(), shared, |leaf| block_bounds(&t.blocks[leaf]));
+            t.tree.validate(t.blocks.len(), |leaf| block_bounds(&t.blocks[leaf]));
+            for block in &t.blocks {
+                let lanes = (0..16).filter(|l| block.lanes >> l & 1 == 1);
+                for (triangle, found) in lanes.map(|l| (block.triangle[l], block.corners(l))) {
+                    let stored = corners(mesh, triangle).map(|p| p.to_array());
+                    assert_eq!(found, stored, "triangle {triangle} is misplaced");
+                    leaves[triangle as usize] += 1;
+                }
+            }
+        }
+        for (triangle, &count) in leaves.iter().enumerate() {
+            let expected = usize::from(has_area(&corners(mesh, triangle as u32)));
+            let shared = options.tree == TreeKind::OctreePushed && expected == 1;
+            assert!(count == expected || (shared && count > 1), "triangle {triangle} lies in {count} leaves");
         }
     }
 }
 
+/// Whether corners differ. Without area no pixel centre is covered, whatever the view.
+#[inline(always)]
+fn has_area([a, b, c]: &[Vec3; 3]) -> bool {
+    a != b && b != c && c != a
+}
+
+#[inline(always)]
 fn corners(mesh: &Mesh, triangle: u32) -> [Vec3; 3] {
     mesh.triangles[triangle as usize].map(|v| mesh.positions[v as usize])
 }
@@ -71,17 +96,17 @@ fn corners(mesh: &Mesh, triangle: u32) -> [Vec3; 3] {
 fn build_blocks(
     mesh: &Mesh,
     materials: &[Material],
-    primitives: &mut [Primitive],
-    options: &IndexOptions,
+    mut primitives: Vec<Primitive>,
+    tree: TreeKind,
 ) -> BlockTree {
-    let built = match options.tree {
-        TreeKind::Bvh => bvh::build(primitives, 16),
-        TreeKind::OctreeSmallest => octree::build(primitives, false, |t| corners(mesh, t)),
-        TreeKind::OctreePushed => octree::build(primitives, true, |t| corners(mesh, t)),
+    let built = match tree {
+        TreeKind::Bvh => bvh::build(&mut primitives, 16),
+        TreeKind::OctreeSmallest => octree::build_smallest(primitives, 16),
+        TreeKind::OctreePushed => octree::build_pushed(primitives, 16, |t| corners(mesh, t)),
     };
     let blocks = built
         .leaf_start
-        .windows(2)
+        .par_windows(2)
         .map(|range| block(mesh, materials, &built.order[range[0] as usize..range[1] as usize]))
         .collect();
     BlockTree { tree: built.tree, blocks }

@@ -8,6 +8,9 @@ mod bvh;
 mod group;
 mod mesh;
 mod octree;
+mod parts;
+mod poses;
+mod refit;
 mod tree;
 
 pub(crate) use group::GroupIndex;
@@ -57,7 +60,7 @@ impl SceneIndex {
         let mut groups: Vec<GroupIndex> = Vec::with_capacity(scene.groups.len());
         for group in &scene.groups {
             let bounds = |c: Content| content_bounds(&meshes, &groups, c);
-            let index = GroupIndex::build(group, bounds, |c| match c {
+            let index = GroupIndex::build(group, options.tree, bounds, |c| match c {
                 Content::Mesh(_) => 1,
                 Content::Group(g) => counts[g as usize],
                 Content::Nothing => 0,
@@ -82,25 +85,36 @@ impl SceneIndex {
     }
 
     /// Poses the scene at `time` seconds of animation `animation` and refits what moved; static parts are
-    /// untouched. Returns the number of root-group nodes with content that moved. Cost: the root group's
-    /// nodes, plus the boxes above those that moved.
+    /// untouched. Returns the number of root-group nodes with content that moved. Cost: the animation's
+    /// channels, the nodes below those that they move, and the boxes above; the first time, all nodes of the
+    /// root group.
     pub fn pose(&mut self, animation: usize, time: f64) -> usize {
-        self.scene.pose(animation, time);
-        self.update()
+        if !self.scene.pose(animation, time) {
+            return 0;
+        }
+        let mut changed: Vec<u32> =
+            self.scene.animations[animation].channels.iter().map(|channel| channel.node).collect();
+        changed.retain(|&n| (n as usize) < self.scene.root_group().nodes.len());
+        changed.sort_unstable();
+        changed.dedup();
+        self.update(&changed)
     }
 
-    /// Moves one node of the root group; returns how many nodes with content moved with it.
+    /// Moves one node of the root group; returns how many nodes with content moved with it. Cost: as of
+    /// [`SceneIndex::pose`].
     pub fn set_transform(&mut self, node: u32, local: Transform) -> usize {
         let root = self.scene.root as usize;
         self.scene.groups[root].nodes[node as usize].local = local;
-        self.update()
+        self.update(&[node])
     }
 
-    fn update(&mut self) -> usize {
+    /// Follows the nodes in `changed` (ascending) and below.
+    fn update(&mut self, changed: &[u32]) -> usize {
         let root = self.scene.root as usize;
-        let mut group = std::mem::take(&mut self.groups[root]);
-        let moved = group.update(&self.scene.groups[root], |c| content_bounds(&self.meshes, &self.groups, c));
-        self.groups[root] = group;
+        let mut index = std::mem::take(&mut self.groups[root]);
+        let group = &self.scene.groups[root];
+        let moved = index.update(group, changed, |c| content_bounds(&self.meshes, &self.groups, c));
+        self.groups[root] = index;
         if moved > 0 {
             if cfg!(debug_assertions) {
                 self.validate();
@@ -122,11 +136,11 @@ impl SceneIndex {
 
     /// Asserts the trees' invariants: every primitive in place, every box around what it holds.
     pub fn validate(&self) {
-        for mesh in &self.meshes {
-            mesh.validate(&self.options);
+        for (index, mesh) in self.meshes.iter().zip(&self.scene.meshes) {
+            index.validate(mesh, &self.options);
         }
-        for group in &self.groups {
-            group.validate(|c| content_bounds(&self.meshes, &self.groups, c));
+        for (index, group) in self.groups.iter().zip(&self.scene.groups) {
+            index.validate(group, |c| content_bounds(&self.meshes, &self.groups, c));
         }
     }
 }
@@ -143,3 +157,6 @@ fn content_bounds(meshes: &[MeshIndex], groups: &[GroupIndex], content: Content)
         Content::Nothing => Box3::EMPTY,
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -91,16 +91,25 @@ pub(crate) struct Box3 {
 impl Box3 {
     pub const EMPTY: Box3 = Box3 { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
 
-    /// The box rounded outwards to f32.
+    /// The box rounded outwards to f32. Beyond f32 it ends at the largest number; one that is no box reaches
+    /// everywhere.
     pub fn around(b: &Aabb) -> Box3 {
         if b.is_empty() {
             return Box3::EMPTY;
         }
-        let down = |v: f64| if f64::from(v as f32) > v { (v as f32).next_down() } else { v as f32 };
-        let up = |v: f64| if f64::from(v as f32) < v { (v as f32).next_up() } else { v as f32 };
+        let down = |v: f64| match v as f32 {
+            n if n.is_nan() => f32::MIN,
+            n if f64::from(n) > v => n.next_down(),
+            n => n,
+        };
+        let up = |v: f64| match v as f32 {
+            n if n.is_nan() => f32::MAX,
+            n if f64::from(n) < v => n.next_up(),
+            n => n,
+        };
         Box3 {
-            min: b.min.to_array().map(|v| down(v).max(f32::MIN)),
-            max: b.max.to_array().map(|v| up(v).min(f32::MAX)),
+            min: b.min.to_array().map(|v| down(v).clamp(f32::MIN, f32::MAX)),
+            max: b.max.to_array().map(|v| up(v).clamp(f32::MIN, f32::MAX)),
         }
     }
 
@@ -111,9 +120,11 @@ impl Box3 {
 
     #[inline(always)]
     pub fn union(&self, o: &Box3) -> Box3 {
+        // Written out: closures over arrays are not always inlined here.
+        let (a, b) = (self, o);
         Box3 {
-            min: std::array::from_fn(|i| self.min[i].min(o.min[i])),
-            max: std::array::from_fn(|i| self.max[i].max(o.max[i])),
+            min: [a.min[0].min(b.min[0]), a.min[1].min(b.min[1]), a.min[2].min(b.min[2])],
+            max: [a.max[0].max(b.max[0]), a.max[1].max(b.max[1]), a.max[2].max(b.max[2])],
         }
     }
 
@@ -128,7 +139,7 @@ impl Box3 {
     /// Half the surface area; f64, so that no extent overflows.
     #[inline(always)]
     pub fn half_area(&self) -> f64 {
-        let [x, y, z]: [f64; 3] = std::array::from_fn(|i| f64::from(self.max[i]) - f64::from(self.min[i]));
+        let [x, y, z] = [0, 1, 2].map(|i| f64::from(self.max[i]) - f64::from(self.min[i]));
         x * y + y * z + z * x
     }
 
@@ -149,10 +160,10 @@ impl WideTree {
         self.nodes.first().map_or(Box3::EMPTY, WideNode::bounds)
     }
 
-    /// Asserts that every leaf number below `leaves` occurs (once, unless `shared`), every node is
-    /// reached once from the root, and every slot's box contains what lies below it.
-    pub fn validate(&self, leaves: usize, shared: bool, bounds_of_leaf: impl Fn(usize) -> Box3) {
-        let mut seen = vec![0u32; leaves];
+    /// Asserts that every leaf number below `leaves` occurs once, every node is reached once from the root,
+    /// and every slot's box contains what lies below it.
+    pub fn validate(&self, leaves: usize, bounds_of_leaf: impl Fn(usize) -> Box3) {
+        let mut seen = vec![false; leaves];
         let mut reached = vec![false; self.nodes.len()];
         if let Some(root) = reached.first_mut() {
             *root = true;
@@ -163,9 +174,10 @@ impl WideTree {
             for slot in (0..node.used as usize).filter(|&s| node.child[s] != Slot::EMPTY) {
                 let inner = match node.child[slot].child() {
                     Child::Leaf(leaf) => {
-                        seen[leaf as usize] += 1;
-                        // A pushed-down primitive may stick out of a cube that holds a part of it.
-                        if shared { Box3::EMPTY } else { bounds_of_leaf(leaf as usize) }
+                        let leaf = leaf as usize;
+                        assert!(!seen[leaf], "leaf {leaf} has two parents");
+                        seen[leaf] = true;
+                        bounds_of_leaf(leaf)
                     }
                     Child::Node(child) => {
                         assert!(child as usize > n, "node {child} comes before its parent {n}");
@@ -177,8 +189,6 @@ impl WideTree {
                 assert!(node.bounds_of(slot).contains(&inner), "slot {slot} of node {n} is too small");
             }
         }
-        for (leaf, &count) in seen.iter().enumerate() {
-            assert!(count == 1 || (shared && count > 1), "leaf {leaf} occurs {count} times");
-        }
+        assert!(seen.iter().all(|&s| s), "a leaf is nowhere in the tree");
     }
 }

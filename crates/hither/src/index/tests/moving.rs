@@ -1,0 +1,173 @@
+//! What moves costs what it moves; what rests is left alone.
+
+use super::*;
+use glam::{DAffine3, DQuat};
+use proptest::prelude::*;
+
+/// `count` nodes with a triangle, of which about a third hang from earlier ones.
+fn crowd(count: usize, random: &mut Random) -> Scene {
+    let mut scene = Scene::new("crowd");
+    scene.meshes = vec![triangle(), Mesh::default()];
+    // Depth-first: a parent is the last node or one of those it hangs from.
+    let mut open: Vec<u32> = Vec::new();
+    for i in 0..count as u32 {
+        let keep = random.below(open.len() + 1);
+        open.truncate(keep);
+        let content = match random.below(8) {
+            0 => Content::Nothing,
+            1 => Content::Mesh(1),
+            _ => Content::Mesh(0),
+        };
+        let node = Node { parent: open.last().copied(), ..shown(content, random.point(5.0)) };
+        scene.groups[0].push(node);
+        if random.below(3) > 0 {
+            open.push(i);
+        }
+    }
+    scene
+}
+
+fn somewhere(random: &mut Random) -> Transform {
+    match random.below(6) {
+        0 => Transform::default(),
+        1 => Transform::Affine(DAffine3::from_scale(DVec3::ZERO)),
+        2 => Transform::from_translation(random.point(1e18)),
+        3 => Transform::from_translation(random.point(1e-18)),
+        _ => Transform::Trs {
+            translation: random.point(9.0),
+            rotation: DQuat::from_rotation_y(random.unit() * 6.0),
+            scale: DVec3::splat(random.unit() * 2.0 - 1.0),
+        },
+    }
+}
+
+/// Slots in use that hold items.
+fn items_in(tree: &WideTree) -> Vec<u32> {
+    let slots = tree.nodes.iter().flat_map(|n| &n.child[..n.used as usize]);
+    let mut items: Vec<u32> = slots
+        .filter(|&&s| s != Slot::EMPTY)
+        .filter_map(|s| match s.child() {
+            Child::Leaf(item) => Some(item),
+            Child::Node(_) => None,
+        })
+        .collect();
+    items.sort_unstable();
+    items
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn any_moves_keep_the_trees_sound(seed: u64, count in 1usize..120, moves in 1usize..40) {
+        let random = &mut Random(seed);
+        let scene = crowd(count, random);
+        for tree in KINDS {
+            let mut index = SceneIndex::build(scene.clone(), &IndexOptions { tree });
+            let mut moved_once = vec![false; count];
+            for _ in 0..moves {
+                let before: Vec<DAffine3> = index.groups[0].items.iter().map(|i| i.group_from_content).collect();
+                let moved = index.set_transform(random.below(count) as u32, somewhere(random));
+                index.validate();
+                let group = &index.groups[0];
+                let mut elsewhere = 0;
+                for (item, before) in group.items.iter().zip(before) {
+                    if item.group_from_content != before && item.content == Content::Mesh(0) {
+                        elsewhere += 1;
+                        moved_once[item.node as usize] = true;
+                    }
+                }
+                prop_assert_eq!(moved, elsewhere);
+                for &item in &items_in(&group.resting) {
+                    prop_assert!(!moved_once[group.items[item as usize].node as usize]);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_rests_is_not_touched() {
+    for tree in KINDS {
+        let mut scene = Scene::new("hall");
+        scene.meshes.push(triangle());
+        for i in 0..500 {
+            scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(50.0)));
+        }
+        let mut index = SceneIndex::build(scene, &IndexOptions { tree });
+        assert_eq!(index.set_transform(7, Transform::from_translation(DVec3::X)), 1);
+        let resting = format!("{:?}", index.groups[0].resting);
+        for step in 0..100 {
+            assert_eq!(index.set_transform(7, Transform::from_translation(DVec3::X * f64::from(step))), 1);
+            assert_eq!(items_in(&index.groups[0].moving), [7]);
+        }
+        assert_eq!(format!("{:?}", index.groups[0].resting), resting);
+        assert_eq!(items_in(&index.groups[0].resting).len(), 499);
+        let epoch = index.epoch;
+        assert_eq!(index.set_transform(7, Transform::from_translation(DVec3::X * 99.0)), 0);
+        assert_eq!(index.epoch, epoch);
+    }
+}
+
+#[test]
+fn a_tree_grown_loose_is_built_anew() {
+    let mut scene = Scene::new("swarm");
+    scene.meshes.push(triangle());
+    for i in 0..64 {
+        scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(1.0)));
+    }
+    let mut index = SceneIndex::build(scene, &IndexOptions::default());
+    let mut random = Random(9);
+    for round in 0..8 {
+        for node in 0..64 {
+            // All leave, round by round for a place twice as far away, where the tree they had fits badly.
+            let at = random.point(2f64.powi(round));
+            index.set_transform(node, Transform::from_translation(at));
+        }
+        let group = &index.groups[0];
+        assert!(group.resting.nodes.is_empty());
+        assert_eq!(items_in(&group.moving).len(), 64);
+    }
+}
+
+#[test]
+fn a_pose_moves_what_its_channels_name_and_what_hangs_from_it() {
+    use crate::scene::{Animation, Channel, Interpolation, Property};
+    let mut scene = Scene::new("door and handle");
+    scene.meshes.push(triangle());
+    let root = &mut scene.groups[0];
+    root.push(shown(Content::Mesh(0), DVec3::ZERO));
+    root.push(Node { parent: Some(0), ..shown(Content::Mesh(0), DVec3::Y) });
+    root.push(shown(Content::Mesh(0), DVec3::Z));
+    let values = vec![glam::Vec4::ZERO, glam::Vec4::X];
+    let channel = Channel {
+        node: 0,
+        property: Property::Translation,
+        interpolation: Interpolation::Linear,
+        times: vec![0.0, 1.0],
+        values,
+    };
+    scene.animations.push(Animation { name: String::new(), channels: vec![channel] });
+    for tree in KINDS {
+        let mut index = SceneIndex::build(scene.clone(), &IndexOptions { tree });
+        assert_eq!(index.pose(0, 0.0), 0);
+        assert_eq!(index.pose(0, 0.5), 2);
+        assert_eq!(index.pose(0, 0.5), 0);
+        assert_eq!(index.pose(0, 2.0), 2);
+        assert_eq!(index.pose(1, 0.0), 0);
+        index.validate();
+    }
+}
+
+#[test]
+fn transforms_beyond_all_numbers_are_survived() {
+    let scene = scene_of(triangle());
+    for tree in KINDS {
+        let mut index = SceneIndex::build(scene.clone(), &IndexOptions { tree });
+        for scale in [1e30, 1e39, 1e300, f64::MAX, 1.0] {
+            index.set_transform(0, Transform::Affine(DAffine3::from_scale(DVec3::splat(scale))));
+            let far = Transform::from_translation(DVec3::splat(-scale));
+            index.set_transform(0, far);
+            index.validate();
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Worlds that nest: deep, and wide without being stored wide.
+
+use super::*;
+
+#[test]
+fn ten_thousand_nodes_hang_from_each_other() {
+    const DEPTH: u32 = 10_000;
+    let mut scene = Scene::new("chain");
+    scene.meshes.push(triangle());
+    for i in 0..DEPTH {
+        let node = shown(Content::Mesh(0), DVec3::X);
+        scene.groups[0].push(Node { parent: i.checked_sub(1), ..node });
+    }
+    for tree in KINDS {
+        let mut index = SceneIndex::build(scene.clone(), &IndexOptions { tree });
+        assert_eq!(index.set_transform(0, Transform::from_translation(DVec3::Y)), DEPTH as usize);
+        assert_eq!(index.set_transform(DEPTH - 1, Transform::from_translation(DVec3::Y)), 1);
+        index.validate();
+    }
+}
+
+#[test]
+fn ten_thousand_groups_nest() {
+    let mut scene = scene_of(triangle());
+    for g in 0..9_999 {
+        let mut group = Group::default();
+        group.push(shown(Content::Group(g), DVec3::X));
+        scene.groups.push(group);
+    }
+    scene.root = 9_999;
+    for tree in KINDS {
+        let index = SceneIndex::build(scene.clone(), &IndexOptions { tree });
+        let bounds = index.groups[9_999].bounds();
+        assert!(bounds.contains(&Box3 { min: [9_999.0, 0.0, 0.0], max: [10_000.0, 1.0, 0.0] }));
+    }
+}
+
+/// 33×33×33 modules as rows of modules, storeys of rows, a building of storeys.
+#[test]
+fn a_nested_building_takes_little_memory() {
+    const SIDE: usize = 33;
+    let mut scene = scene_of(mesh_of((0..1000).map(|i| {
+        let at = Random(i).point(0.5);
+        [at, at + DVec3::X * 0.01, at + DVec3::Y * 0.01]
+    })));
+    for (g, axis) in [DVec3::X, DVec3::Z, DVec3::Y].into_iter().enumerate() {
+        let mut group = Group::default();
+        for i in 0..SIDE {
+            group.push(shown(Content::Group(g as u32), axis * i as f64));
+        }
+        scene.groups.push(group);
+    }
+    scene.root = 3;
+    assert_eq!(scene.instance_count(), 35_937);
+    for tree in KINDS {
+        let index = SceneIndex::build(scene.clone(), &IndexOptions { tree });
+        let module: usize = index.meshes.iter().map(MeshIndex::memory_bytes).sum();
+        assert!(index.memory_bytes() - module < 100_000, "{} bytes", index.memory_bytes() - module);
+    }
+}
