@@ -5,6 +5,7 @@
 use super::buffers::Buffers;
 use super::fault::{Fault, malformed, part};
 use super::json::{Accessor, Index, Sparse, Whole};
+use std::ops::Range;
 
 /// A checked accessor.
 pub(super) struct Elements<'a> {
@@ -111,17 +112,24 @@ impl<'a> Elements<'a> {
 
     /// The elements as `N` floats each. Integers are scaled where the accessor says `normalized`.
     pub(super) fn floats<const N: usize>(&self) -> Result<Vec<[f32; N]>, Fault> {
+        self.floats_in(0..self.count)
+    }
+
+    /// The elements in `range`, all of which exist, as `N` floats each.
+    pub(super) fn floats_in<const N: usize>(&self, range: Range<usize>) -> Result<Vec<[f32; N]>, Fault> {
         if self.width() != N {
             return self.fault(format!("it is of type {}, where {N} components are needed", self.kind));
         }
-        self.buffers.spend((self.count as u64).saturating_mul(4 * N as u64))?;
+        self.buffers.spend((range.len() as u64).saturating_mul(4 * N as u64))?;
         let mut all = match self.dense {
-            Some(dense) => self.to_floats(dense),
-            None => vec![[0.0; N]; self.count],
+            Some(dense) => self.to_floats(dense.part(&range)),
+            None => vec![[0.0; N]; range.len()],
         };
         if let Some((places, values)) = &self.sparse {
             for (&place, value) in places.iter().zip(self.to_floats(*values)) {
-                all[place as usize] = value;
+                if range.contains(&(place as usize)) {
+                    all[place as usize - range.start] = value;
+                }
             }
         }
         Ok(all)
@@ -247,6 +255,12 @@ impl<'a> Strided<'a> {
         let (count, start) = (count as usize, if count == 0 { 0 } else { offset.0 as usize });
         let stride = usize::try_from(stride).unwrap_or(usize::MAX);
         Ok(Strided { bytes: &bytes[start..], stride, count })
+    }
+
+    /// The elements in `range`, all of which exist.
+    fn part(&self, range: &Range<usize>) -> Strided<'a> {
+        let bytes = if range.is_empty() { &[] } else { &self.bytes[range.start * self.stride..] };
+        Strided { bytes, stride: self.stride, count: range.len() }
     }
 
     /// All elements, `N` components of `W` bytes each.

@@ -1,17 +1,20 @@
 //! Meshes: primitives of every triangle mode become one indexed triangle list with its attributes.
 //!
 //! Triangles keep the order of the file, strips and fans expanded. An index out of range is refused; a
-//! triangle that touches a position which is no number is left out and told of. Attributes that only some
-//! primitives of a mesh have are filled in: face normals, white, texture coordinates of 0.
+//! triangle that touches a position which is no number is left out and told of. Primitives that share
+//! attributes share vertices. Where a mesh takes less than half of its attributes' elements (some exporters
+//! keep a whole file's vertices in one list), only the range that it takes is read.
 
 use super::accessor::Elements;
+use super::attributes::{self, Attributes, Vertices};
 use super::buffers::Buffers;
 use super::fault::{Fault, Oddities, malformed, part, unsupported};
-use super::json::{self, Index};
+use super::json;
 use super::material::Materials;
-use glam::{Vec2, Vec3, Vec4};
+use glam::Vec3;
 use hither::scene::{Mesh, Primitive};
 use std::collections::HashMap;
+use std::ops::Range;
 
 /// Reads mesh `index` of the document.
 pub(super) fn read(
@@ -22,30 +25,30 @@ pub(super) fn read(
 ) -> Result<Mesh, Fault> {
     let source = &buffers.document().meshes[index];
     let place = part("mesh", index, &source.name);
-    let drawn: Vec<(usize, &json::Primitive, Mode)> = source
-        .primitives
-        .iter()
-        .enumerate()
-        .filter_map(|(i, primitive)| Mode::of(primitive).map(|mode| (i, primitive, mode)))
-        .collect();
-    let mut builder = Builder {
-        buffers,
-        mesh: Mesh { name: source.name.clone(), ..Mesh::default() },
-        with_normals: drawn.iter().any(|(_, p, _)| p.attributes.contains_key("NORMAL")),
-        with_colors: drawn.iter().any(|(_, p, _)| p.attributes.contains_key("COLOR_0")),
-        with_uvs: drawn.iter().any(|(_, p, _)| uv_of(p, materials).is_some()),
-        vertices: HashMap::new(),
-    };
-    for (i, primitive, mode) in &drawn {
+    let mut runs = Vec::new();
+    for (i, primitive) in source.primitives.iter().enumerate() {
         let here = || format!("{place}, primitive {i}");
-        if let Some(oddity) = builder.add(primitive, *mode, materials).map_err(|f| f.at(here()))? {
-            oddities.note(here(), oddity);
+        match Run::read(buffers, materials, primitive).map_err(|f| f.at(here()))? {
+            Ok(run) => runs.push((i, run)),
+            Err(oddity) => oddities.note(if oddity == THIN { place.clone() } else { here() }, oddity),
         }
     }
-    tell_what_is_left_out(source, &place, materials, oddities)?;
-    let mut mesh = builder.mesh;
+    if source.primitives.iter().any(|p| !p.targets.is_empty()) {
+        oddities.note(&*place, "has morph targets, which are left out; it is drawn in its rest shape");
+    }
+    let mut mesh = Mesh { name: source.name.clone(), ..Mesh::default() };
+    let mut vertices = Vertices::new(buffers, runs.iter().map(|(_, run)| &run.attributes));
+    let ranges = ranges(&runs);
+    for (i, run) in runs {
+        let here = || format!("{place}, primitive {i}");
+        if materials.is_textured(run.primitive.material) && run.attributes.uv.is_none() {
+            oddities.note(here(), "lacks the texture coordinates that its material asks for");
+        }
+        let range = ranges[&run.attributes].clone();
+        run.append(&mut mesh, &mut vertices, range).map_err(|f| f.at(here()))?;
+    }
     drop_non_finite(&mut mesh, &place, oddities);
-    tidy_attributes(&mut mesh, &place, oddities);
+    attributes::tidy(&mut mesh, &place, oddities);
     Ok(mesh)
 }
 
@@ -57,16 +60,6 @@ enum Mode {
 }
 
 impl Mode {
-    /// `None` for points, for lines, and for numbers that mean nothing.
-    fn of(primitive: &json::Primitive) -> Option<Mode> {
-        match primitive.mode.map_or(4, |m| m.0) {
-            4 => Some(Mode::Triangles),
-            5 => Some(Mode::Strip),
-            6 => Some(Mode::Fan),
-            _ => None,
-        }
-    }
-
     /// The corners of every triangle, counter-clockwise as the file means it.
     fn expand(self, corners: &[u32]) -> Vec<[u32; 3]> {
         match self {
@@ -84,228 +77,130 @@ impl Mode {
     }
 }
 
-/// The accessor of the texture coordinates that a primitive's material asks for.
-fn uv_of(primitive: &json::Primitive, materials: &Materials) -> Option<Index> {
-    let set = materials.uv_set(primitive.material);
-    primitive.attributes.get(&format!("TEXCOORD_{set}")).copied()
+/// Why points and lines are not there.
+const THIN: &str = "its points and lines are left out";
+/// Why a mesh, or a whole file, is refused.
+pub(super) const DRACO_IS_NOT_READ: &str = "it is compressed with Draco (KHR_draco_mesh_compression), which is not read; convert the \
+                     file to one without, for example by opening it in Blender and exporting it uncompressed";
+
+/// A primitive whose corners are known, before its vertices are read.
+struct Run<'a> {
+    primitive: &'a json::Primitive,
+    material: Option<u32>,
+    attributes: Attributes,
+    /// Elements that the attributes have.
+    count: u32,
+    /// Corners as elements of the attributes, all of which exist; at least one triangle.
+    triangles: Vec<[u32; 3]>,
 }
 
-struct Builder<'a> {
-    buffers: &'a Buffers<'a>,
-    mesh: Mesh,
-    with_normals: bool,
-    with_uvs: bool,
-    with_colors: bool,
-    /// The first vertex of attributes that were read before: primitives often share them.
-    vertices: HashMap<[Option<Index>; 4], (u32, u32)>,
-}
-
-impl Builder<'_> {
-    /// Appends a primitive. Returns what is odd about it.
-    fn add(
-        &mut self,
-        primitive: &json::Primitive,
-        mode: Mode,
+impl<'a> Run<'a> {
+    /// Reads a primitive's corners; or says why it is left out.
+    fn read(
+        buffers: &Buffers,
         materials: &Materials,
-    ) -> Result<Option<&'static str>, Fault> {
+        primitive: &'a json::Primitive,
+    ) -> Result<Result<Run<'a>, &'static str>, Fault> {
         let material = materials.scene_index(primitive.material)?;
-        let Some(&position) = primitive.attributes.get("POSITION") else {
-            return Ok(Some("has no positions; it is left out"));
+        let mode = match primitive.mode.map_or(4, |m| m.0) {
+            0..=3 => return Ok(Err(THIN)),
+            4 => Mode::Triangles,
+            5 => Mode::Strip,
+            6 => Mode::Fan,
+            other => return malformed(format!("its mode {other} is none of glTF's")),
         };
-        let positions = Elements::resolve(self.buffers, position).map_err(|f| f.at("POSITION"))?;
+        let uv = format!("TEXCOORD_{}", materials.uv_set(primitive.material));
+        let Some(attributes) = Attributes::of(primitive, &uv) else {
+            return Ok(Err("has no positions; it is left out"));
+        };
+        let positions = Elements::resolve(buffers, attributes.position).map_err(|f| f.at("POSITION"))?;
         if primitive.extensions.draco.is_some() && !positions.has_data() {
-            return unsupported(DRACO);
+            return unsupported(DRACO_IS_NOT_READ);
         }
-        let normal = primitive.attributes.get("NORMAL").copied();
-        let key = [
-            Some(position),
-            normal,
-            uv_of(primitive, materials),
-            primitive.attributes.get("COLOR_0").copied(),
-        ];
-        let flat = self.with_normals && normal.is_none();
-        let (base, count) = match self.vertices.get(&key) {
-            Some(&known) => known,
-            None => self.append_vertices(&positions, key)?,
+        let Ok(count) = u32::try_from(positions.count()) else {
+            return malformed("it has more than 4294967295 vertices");
         };
-        let mut triangles = self.corners(primitive, mode, count)?;
-        if base > 0 {
-            triangles.as_flattened_mut().iter_mut().for_each(|corner| *corner += base);
+        let triangles = corners(buffers, primitive, mode, count)?;
+        if triangles.is_empty() {
+            return Ok(Err("has too few corners for a triangle; it is left out"));
         }
-        if flat {
-            self.flatten(&mut triangles)?;
+        Ok(Ok(Run { primitive, material, attributes, count, triangles }))
+    }
+
+    /// Appends its triangles to the mesh; of its attributes the elements in `range`.
+    fn append(mut self, mesh: &mut Mesh, vertices: &mut Vertices, range: Range<u32>) -> Result<(), Fault> {
+        let start = range.start;
+        let first = vertices.append(mesh, self.attributes, range)?;
+        let shift = first.wrapping_sub(start);
+        if shift != 0 {
+            self.triangles
+                .as_flattened_mut()
+                .iter_mut()
+                .for_each(|corner| *corner = corner.wrapping_add(shift));
+        }
+        vertices.flatten(mesh, self.attributes, &mut self.triangles)?;
+        let start = mesh.triangles.len();
+        if mesh.triangles.is_empty() {
+            mesh.triangles = self.triangles;
         } else {
-            self.vertices.insert(key, (base, count));
+            mesh.triangles.append(&mut self.triangles);
         }
-        let start = self.mesh.triangles.len();
-        if self.mesh.triangles.is_empty() {
-            self.mesh.triangles = triangles;
-        } else {
-            self.mesh.triangles.append(&mut triangles);
-        }
-        let end = self.mesh.triangles.len();
-        let (Ok(first), Ok(last)) = (u32::try_from(start), u32::try_from(end)) else {
+        let (Ok(start), Ok(end)) = (u32::try_from(start), u32::try_from(mesh.triangles.len())) else {
             return malformed("the mesh has more than 4294967295 triangles");
         };
-        if start == end {
-            return Ok(Some("has too few corners for a triangle; it is left out"));
-        }
-        self.mesh.primitives.push(Primitive { triangles: first..last, material });
-        if materials.is_textured(primitive.material) && key[2].is_none() {
-            return Ok(Some("lacks the texture coordinates that its material asks for"));
-        }
-        Ok(None)
-    }
-
-    /// The triangles of a primitive with `count` vertices, every corner checked.
-    fn corners(&self, primitive: &json::Primitive, mode: Mode, count: u32) -> Result<Vec<[u32; 3]>, Fault> {
-        let indices = match primitive.indices {
-            Some(index) => {
-                let indices = Elements::resolve(self.buffers, index).and_then(|e| e.indices());
-                let indices = indices.map_err(|f| f.at("indices"))?;
-                // One pass that a compiler can vectorise; the place is looked for only on failure.
-                if indices.iter().fold(0, |most, &i| most.max(i)) >= count
-                    && let Some(bad) = indices.iter().position(|&i| i >= count)
-                {
-                    return malformed(format!(
-                        "index {bad} is {}, but there are {count} vertices",
-                        indices[bad]
-                    ));
-                }
-                indices
-            }
-            None => {
-                self.buffers.spend(4 * u64::from(count))?;
-                (0..count).collect()
-            }
-        };
-        if mode != Mode::Triangles {
-            self.buffers.spend(12 * indices.len() as u64)?;
-        }
-        Ok(mode.expand(&indices))
-    }
-
-    /// Reads the attributes `[position, normal, texture coordinates, colour]`; the first vertex and how many.
-    fn append_vertices(
-        &mut self,
-        positions: &Elements,
-        [_, normal, uv, color]: [Option<Index>; 4],
-    ) -> Result<(u32, u32), Fault> {
-        let base = self.mesh.positions.len();
-        let count = positions.count();
-        let (Ok(first), Ok(_)) = (u32::try_from(base), u32::try_from(base.saturating_add(count))) else {
-            return malformed("the mesh has more than 4294967295 vertices");
-        };
-        append(&mut self.mesh.positions, positions.floats().map_err(|f| f.at("POSITION"))?, Vec3::from_array);
-        let resolve = |name: &'static str, index: Index| -> Result<Elements, Fault> {
-            let elements = Elements::resolve(self.buffers, index).map_err(|f| f.at(name))?;
-            if elements.count() != count {
-                let others = elements.count();
-                return malformed(format!("{name} has {others} elements, but there are {count} positions"));
-            }
-            Ok(elements)
-        };
-        if let Some(index) = normal {
-            let normals = resolve("NORMAL", index)?.floats().map_err(|f| f.at("NORMAL"))?;
-            append(&mut self.mesh.normals, normals, Vec3::from_array);
-        } else if self.with_normals {
-            self.mesh.normals.resize(base + count, Vec3::Z);
-        }
-        if let Some(index) = uv {
-            let uvs = resolve("TEXCOORD", index)?.floats().map_err(|f| f.at("TEXCOORD"))?;
-            append(&mut self.mesh.uvs, uvs, Vec2::from_array);
-        } else if self.with_uvs {
-            self.mesh.uvs.resize(base + count, Vec2::ZERO);
-        }
-        if let Some(index) = color {
-            let colors = resolve("COLOR_0", index)?;
-            if colors.width() == 3 {
-                let colors = colors.floats().map_err(|f| f.at("COLOR_0"))?;
-                append(&mut self.mesh.colors, colors, |[r, g, b]| Vec4::new(r, g, b, 1.0));
-            } else {
-                let colors = colors.floats().map_err(|f| f.at("COLOR_0"))?;
-                append(&mut self.mesh.colors, colors, Vec4::from_array);
-            }
-        } else if self.with_colors {
-            self.mesh.colors.resize(base + count, Vec4::ONE);
-        }
-        Ok((first, count as u32))
-    }
-
-    /// Gives every triangle corners of its own, with the face's normal.
-    fn flatten(&mut self, triangles: &mut [[u32; 3]]) -> Result<(), Fault> {
-        self.buffers.spend(3 * 48 * triangles.len() as u64)?;
-        let mesh = &mut self.mesh;
-        if mesh.positions.len().saturating_add(3 * triangles.len()) > u32::MAX as usize {
-            return malformed("the mesh has more than 4294967295 vertices");
-        }
-        for triangle in triangles {
-            let corners = triangle.map(|c| c as usize);
-            let first = mesh.positions.len() as u32;
-            let normal = face_normal(corners.map(|c| mesh.positions[c]));
-            for c in corners {
-                mesh.positions.push(mesh.positions[c]);
-                mesh.normals.push(normal);
-                if self.with_uvs {
-                    mesh.uvs.push(mesh.uvs[c]);
-                }
-                if self.with_colors {
-                    mesh.colors.push(mesh.colors[c]);
-                }
-            }
-            *triangle = [first, first + 1, first + 2];
-        }
+        mesh.primitives.push(Primitive { triangles: start..end, material: self.material });
         Ok(())
     }
 }
 
-const DRACO: &str = "it is compressed with Draco (KHR_draco_mesh_compression), which is not read; convert the \
-     file without it, for example with `gltf-transform copy in.glb out.glb`";
-
-/// What the file says about its need for Draco.
-pub(super) fn draco_is_needed() -> &'static str {
-    DRACO
-}
-
-fn append<T, const N: usize>(to: &mut Vec<T>, from: Vec<[f32; N]>, convert: impl Fn([f32; N]) -> T) {
-    let converted = from.into_iter().map(convert);
-    if to.is_empty() {
-        *to = converted.collect();
-    } else {
-        to.extend(converted);
+/// Which elements of each set of attributes are read: all, unless less than half are in use.
+fn ranges(runs: &[(usize, Run)]) -> HashMap<Attributes, Range<u32>> {
+    let mut ranges: HashMap<Attributes, Range<u32>> = HashMap::new();
+    for (_, run) in runs {
+        let (first, last) =
+            run.triangles.as_flattened().iter().fold((u32::MAX, 0), |(a, b), &c| (a.min(c), b.max(c)));
+        let range = ranges.entry(run.attributes).or_insert(first..last);
+        *range = range.start.min(first)..range.end.max(last + 1);
     }
-}
-
-/// The unit normal of a triangle; +Z where it has none. Computed in f64: no f32 coordinates overflow it.
-fn face_normal(corners: [Vec3; 3]) -> Vec3 {
-    let [a, b, c] = corners.map(|p| p.as_dvec3());
-    (b - a).cross(c - a).try_normalize().map_or(Vec3::Z, |n| n.as_vec3())
-}
-
-fn tell_what_is_left_out(
-    source: &json::Mesh,
-    place: &str,
-    materials: &Materials,
-    oddities: &mut Oddities,
-) -> Result<(), Fault> {
-    let mut other = false;
-    for (i, primitive) in source.primitives.iter().enumerate() {
-        match primitive.mode.map_or(4, |m| m.0) {
-            0..=3 => other = true,
-            4..=6 => {}
-            mode => return malformed(format!("{place}, primitive {i}: its mode {mode} is none of glTF's")),
-        }
-        if Mode::of(primitive).is_none() {
-            materials.scene_index(primitive.material)?;
+    for (_, run) in runs {
+        if let Some(range) = ranges.get_mut(&run.attributes)
+            && range.len() >= run.count as usize / 2
+        {
+            *range = 0..run.count;
         }
     }
-    if other {
-        oddities.note(place, "its points and lines are left out");
+    ranges
+}
+
+/// The triangles of a primitive with `count` vertices, every corner checked.
+fn corners(
+    buffers: &Buffers,
+    primitive: &json::Primitive,
+    mode: Mode,
+    count: u32,
+) -> Result<Vec<[u32; 3]>, Fault> {
+    let indices = match primitive.indices {
+        Some(index) => {
+            let indices = Elements::resolve(buffers, index).and_then(|e| e.indices());
+            let indices = indices.map_err(|f| f.at("indices"))?;
+            // One pass that a compiler can vectorise; the place is looked for only on failure.
+            if indices.iter().fold(0, |most, &i| most.max(i)) >= count
+                && let Some(bad) = indices.iter().position(|&i| i >= count)
+            {
+                let index = indices[bad];
+                return malformed(format!("index {bad} is {index}, but there are {count} vertices"));
+            }
+            indices
+        }
+        None => {
+            buffers.spend(4 * u64::from(count))?;
+            (0..count).collect()
+        }
+    };
+    if mode != Mode::Triangles {
+        buffers.spend(12 * indices.len() as u64)?;
     }
-    if source.primitives.iter().any(|p| !p.targets.is_empty()) {
-        oddities.note(place, "has morph targets, which are left out; it is drawn in its rest shape");
-    }
-    Ok(())
+    Ok(mode.expand(&indices))
 }
 
 /// Leaves out triangles that touch a position with a coordinate that is NaN or infinite.
@@ -336,47 +231,6 @@ fn drop_non_finite(mesh: &mut Mesh, place: &str, oddities: &mut Oddities) {
             place,
             format!("{dropped} of its {before} triangles touch a position that is not a finite number; they are left out"),
         );
-    }
-}
-
-/// Makes normals unit and the other attributes finite.
-fn tidy_attributes(mesh: &mut Mesh, place: &str, oddities: &mut Oddities) {
-    let mut bad_normals = false;
-    for normal in &mut mesh.normals {
-        // What is unit to within rounding keeps its bits. (NaN is in no range.)
-        if !(0.999_999..=1.000_001).contains(&normal.length_squared()) {
-            *normal = normal.as_dvec3().try_normalize().map_or(Vec3::ZERO, |n| n.as_vec3());
-            bad_normals |= *normal == Vec3::ZERO;
-        }
-    }
-    if bad_normals {
-        for &triangle in &mesh.triangles {
-            let corners = triangle.map(|c| c as usize);
-            if corners.iter().any(|&c| mesh.normals[c] == Vec3::ZERO) {
-                let normal = face_normal(corners.map(|c| mesh.positions[c]));
-                for c in corners {
-                    if mesh.normals[c] == Vec3::ZERO {
-                        mesh.normals[c] = normal;
-                    }
-                }
-            }
-        }
-        mesh.normals.iter_mut().filter(|n| **n == Vec3::ZERO).for_each(|n| *n = Vec3::Z);
-        oddities.note(place, "has normals without direction; those of its faces are used instead");
-    }
-    let mut replaced = false;
-    for uv in &mut mesh.uvs {
-        if !uv.is_finite() {
-            (*uv, replaced) = (Vec2::ZERO, true);
-        }
-    }
-    for color in &mut mesh.colors {
-        if !color.is_finite() {
-            (*color, replaced) = (Vec4::ONE, true);
-        }
-    }
-    if replaced {
-        oddities.note(place, "has texture coordinates or colours that are not finite; 0 and white are used");
     }
 }
 

@@ -6,6 +6,7 @@
 
 mod accessor;
 mod animation;
+mod attributes;
 mod buffers;
 mod camera;
 mod container;
@@ -137,7 +138,7 @@ fn check_version(document: &Document) -> Result<(), Fault> {
 fn check_extensions(document: &Document) -> Result<(), Fault> {
     for name in &document.extensions_required {
         if name == DRACO {
-            return unsupported(mesh::draco_is_needed());
+            return unsupported(mesh::DRACO_IS_NOT_READ);
         }
         if !KNOWN_EXTENSIONS.contains(&name.as_str()) && !name.starts_with(MATERIAL_EXTENSIONS) {
             return unsupported(format!(

@@ -222,3 +222,22 @@ fn huge_and_tiny_faces_have_normals() {
         assert_eq!(build.odd_scene().0.meshes[0].normals, [Vec3::Z; 4]);
     }
 }
+
+#[test]
+fn a_small_part_of_a_large_list_is_read_alone() {
+    let mut build = Build::new();
+    let many: Vec<[f32; 3]> = (0..100u8).map(|i| [f32::from(i), 0.0, f32::from(i % 7)]).collect();
+    let normals: Vec<[f32; 3]> =
+        (0..100).map(|i| if i == 52 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }).collect();
+    let (positions, normals) = (build.floats(&many), build.floats(&normals));
+    let (first, second) = (build.shorts(&[50, 51, 52]), build.shorts(&[52, 51, 54]));
+    let attributes = json!({ "POSITION": positions, "NORMAL": normals });
+    build.show(
+        "part",
+        json!([{ "attributes": attributes, "indices": first }, { "attributes": attributes, "indices": second }]),
+    );
+    let mesh = &build.scene().meshes[0];
+    assert_eq!(mesh.positions, many[50..55].iter().map(|&p| Vec3::from_array(p)).collect::<Vec<_>>());
+    assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 4]]);
+    assert_eq!((mesh.normals[1], mesh.normals[2]), (Vec3::Y, Vec3::X));
+}
