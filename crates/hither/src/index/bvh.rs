@@ -41,8 +41,7 @@ impl Range<'_> {
         if self.primitives.len() <= leaf_size {
             return Part::leaf(self.primitives, self.bounds.finish());
         }
-        let bounds = self.bounds.finish();
-        Part::Node { bounds, parts: parts_of(self.into_sixteen(leaf_size), leaf_size) }
+        Part::around(parts_of(self.into_sixteen(leaf_size), leaf_size))
     }
 }
 

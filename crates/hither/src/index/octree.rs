@@ -18,8 +18,7 @@
 //!   corners, and close to edge-on it may be that of a point outside the cube. This way pictures are the same
 //!   to the last bit whichever tree is used. To be drawn twice changes nothing: id and depth are the same.
 //! - A node has sixteen slots: a cube's children, and its own primitives in leaves made by `bvh`. A child
-//!   with fewer than [`FEW`] primitives hands them to its parent; one whose parts fit into its parent's free
-//!   slots gives way to them; a cube with only one child is skipped.
+//!   with fewer than [`FEW`] primitives hands them to its parent, and a cube with only one child is skipped.
 
 use super::bvh;
 use super::parts::{Built, Part, Primitive, bounds_of};
@@ -183,18 +182,21 @@ impl<A: Fn(&Primitive, &Cube) -> Octants + Sync> Octree<A> {
             }
         }
         let parallel = list.len() > PARALLEL;
-        let (own, children) = self.divide(list, &cube);
+        let (mut own, children) = self.divide(list, &cube);
         let child = |(octant, list): (usize, Vec<Primitive>)| {
             (!list.is_empty()).then(|| self.part(list, cube.octant(octant)))
         };
         let children = children.into_iter().enumerate();
-        let parts: Vec<Part> = if parallel {
+        let mut parts: Vec<Part> = if parallel {
             let parts: Vec<_> = children.collect::<Vec<_>>().into_par_iter().map(child).collect();
             parts.into_iter().flatten().collect()
         } else {
             children.filter_map(child).collect()
         };
-        gather(parts, own, self.leaf_size)
+        if !own.is_empty() {
+            parts.push(bvh::part(&mut own, self.leaf_size));
+        }
+        Part::around(parts)
     }
 
     /// The cube's own primitives, and those of its octants.
@@ -224,25 +226,4 @@ impl<A: Fn(&Primitive, &Cube) -> Octants + Sync> Octree<A> {
         }
         (own, children)
     }
-}
-
-/// A node of `parts` and of what `own` comes to.
-fn gather(mut parts: Vec<Part>, mut own: Vec<Primitive>, leaf_size: usize) -> Part {
-    if !own.is_empty() {
-        parts.push(bvh::part(&mut own, leaf_size));
-    }
-    // The smallest inner node that fits gives way to its parts.
-    loop {
-        let free = 16 - parts.len();
-        let inner = |part: &Part| match part {
-            Part::Node { parts, .. } if parts.len() <= free + 1 => Some(parts.len()),
-            _ => None,
-        };
-        let smallest = (0..parts.len()).filter_map(|i| Some((inner(&parts[i])?, i))).min();
-        let Some((_, at)) = smallest else { break };
-        if let Part::Node { parts: inner, .. } = parts.remove(at) {
-            parts.extend(inner);
-        }
-    }
-    if parts.len() == 1 { parts.remove(0) } else { Part::node(parts) }
 }

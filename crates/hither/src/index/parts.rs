@@ -106,7 +106,25 @@ impl Part {
         Part::Leaf { bounds, primitives: primitives.iter().map(Primitive::index).collect() }
     }
 
-    pub fn node(parts: Vec<Part>) -> Part {
+    /// What holds `parts`, from one to sixteen. Where slots are free, small inner nodes give way to their
+    /// own parts: half-empty nodes are tested at the cost of full ones.
+    pub fn around(mut parts: Vec<Part>) -> Part {
+        loop {
+            let room = 17 - parts.len();
+            let smallest = (0..parts.len())
+                .filter_map(|i| match &parts[i] {
+                    Part::Node { parts, .. } if parts.len() <= room => Some((parts.len(), i)),
+                    _ => None,
+                })
+                .min();
+            let Some((_, at)) = smallest else { break };
+            if let Part::Node { parts: inner, .. } = parts.swap_remove(at) {
+                parts.extend(inner);
+            }
+        }
+        if parts.len() == 1 {
+            return parts.remove(0);
+        }
         let bounds = parts.iter().fold(Box3::EMPTY, |b, p| b.union(p.bounds()));
         Part::Node { bounds, parts }
     }

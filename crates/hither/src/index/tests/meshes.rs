@@ -102,7 +102,7 @@ fn leaves_are_not_mostly_empty() {
 }
 
 #[test]
-fn a_million_copies_are_not_multiplied() {
+fn copies_are_not_multiplied_without_end() {
     let mesh = troubled(Trouble::Coincident, 20_000, 3);
     let index = SceneIndex::build(scene_of(mesh), &IndexOptions { tree: TreeKind::OctreePushed });
     let lanes: u32 = index.meshes[0].solid.blocks.iter().map(|b| b.lanes.count_ones()).sum();
