@@ -28,7 +28,7 @@ use crate::raster::{
 use crate::scene::{Content, Scene};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::DVec3;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
 
 /// Draws what `index` shows of `view` into one window.
@@ -288,15 +288,14 @@ impl<'a> Walk<'a> {
         memory: &Memory,
         root: ScreenFromObject,
     ) {
-        let mut last: Option<(u32, u32, ScreenFromObject)> = None;
+        // Blocks of an instance are not neighbours in depth order; its transform is composed once.
+        let mut placed =
+            HashMap::<u32, Option<(u32, ScreenFromObject)>, BuildHasherDefault<BlockHasher>>::default();
         for &this in &memory.seen {
-            let found = match last {
-                Some(known) if known.0 == this.instance => Some(known),
-                _ => screen_from_instance(self.index, root, this.instance)
-                    .map(|(m, at)| (this.instance, m, at)),
-            };
-            let Some((_, mesh, at)) = found else { continue };
-            last = found;
+            let found = placed
+                .entry(this.instance)
+                .or_insert_with(|| screen_from_instance(self.index, root, this.instance));
+            let Some((mesh, at)) = *found else { continue };
             let scene = self.index.scene();
             let Some(block) = self.index.meshes[mesh as usize].solid.blocks.get(this.block as usize) else {
                 continue;

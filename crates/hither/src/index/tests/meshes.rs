@@ -94,7 +94,7 @@ fn leaves_are_not_mostly_empty() {
         let solid = &index.meshes[0].solid;
         assert!(solid.blocks.len() < 5000 / 6, "{tree:?}: {} leaves", solid.blocks.len());
         assert!(
-            solid.tree.nodes.len() < solid.blocks.len() / 4,
+            solid.tree.nodes.len() < solid.blocks.len() / 3,
             "{tree:?}: {} nodes",
             solid.tree.nodes.len()
         );
