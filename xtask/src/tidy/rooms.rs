@@ -15,8 +15,8 @@ const FLOORS: &[(&str, u32)] = &[
     ("conventions", 1),
     ("geometry", 2),
     ("scene", 3),
+    ("raster", 3),
     ("index", 4),
-    ("raster", 4),
     ("cull", 5),
     ("order", 5),
     ("layers", 6),
@@ -224,7 +224,8 @@ mod tests {
             refused("index", "use crate::scene::Scene;\nuse crate::{geometry::Aabb, render::Frame};").len(),
             1
         );
-        assert_eq!(refused("index", "use crate::raster;").len(), 1);
+        assert_eq!(refused("raster", "use crate::scene;").len(), 1);
+        assert_eq!(refused("raster", "use crate::index;").len(), 1);
         assert!(refused("index", "use crate::index::walk;").is_empty());
     }
 

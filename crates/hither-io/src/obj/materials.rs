@@ -257,7 +257,8 @@ impl Textures {
     ) -> Textures {
         let mut budget = texture::Budget::default();
         let mut seen: HashSet<&[u8]> = HashSet::new();
-        let loaded: Vec<(&[u8], Result<Vec<u8>, String>)> = maps
+        type File<'a> = (&'a [u8], Result<Vec<u8>, String>);
+        let loaded: Vec<File> = maps
             .map(|map| map.file.as_slice())
             .filter(|&file| seen.insert(file))
             .map(|file| {

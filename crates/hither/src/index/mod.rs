@@ -115,10 +115,8 @@ impl SceneIndex {
         let group = &self.scene.groups[root];
         let moved = index.update(group, changed, |c| content_bounds(&self.meshes, &self.groups, c));
         self.groups[root] = index;
-        if moved > 0 {
-            if cfg!(debug_assertions) {
-                self.validate();
-            }
+        if moved > 0 && cfg!(debug_assertions) {
+            self.validate();
         }
         moved
     }

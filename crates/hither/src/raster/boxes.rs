@@ -60,6 +60,7 @@ impl BoxSet {
     }
 }
 
+// A kernel, long because its steps share sixteen boxes' worth of registers.
 /// Projects boxes given as `min` and `max` (axis, lane) into `window` (image coordinates).
 #[inline(always)]
 pub fn project_boxes<S: Simd>(

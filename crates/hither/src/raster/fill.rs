@@ -19,7 +19,7 @@
 //! largest value there plus [`plane_margin`], and never above the corners' largest depth.
 
 use super::clip::clip;
-use super::pyramid::{Sixteen, Target, cell_mask};
+use super::pyramid::{Rect, Sixteen, Target, cell_mask};
 use super::setup::{ScreenTriangle, TriangleBlock, set_up};
 use super::transform::ScreenFromObject;
 use crate::conventions::SurfaceId;
@@ -56,7 +56,7 @@ pub fn draw_block<S: Simd>(
     drawing: &Drawing,
     is_hole: &mut dyn FnMut(usize, i32, i32) -> bool,
 ) -> BlockCounts {
-    let window = super::Rect {
+    let window = Rect {
         left: target.left,
         top: target.top,
         right: target.left + target.width,
@@ -95,7 +95,7 @@ fn draw_clipped<S: Simd>(
     is_hole: &mut dyn FnMut(usize, i32, i32) -> bool,
     counts: &mut BlockCounts,
 ) {
-    let window = super::Rect {
+    let window = Rect {
         left: target.left,
         top: target.top,
         right: target.left + target.width,
@@ -254,35 +254,18 @@ fn fill<S: Simd>(
     how: How,
     is_hole: &mut dyn FnMut(i32, i32) -> bool,
 ) -> Filled {
-    let hierarchical = how.hierarchical;
-    let left = (t.bounds.left - target.left) >> 2;
-    let top = (t.bounds.top - target.top) >> 2;
-    let right = (t.bounds.right - 1 - target.left) >> 2;
-    let bottom = (t.bounds.bottom - 1 - target.top) >> 2;
-    let small = right - left < 2 && bottom - top < 2;
-
+    let blocks = Rect {
+        left: (t.bounds.left - target.left) >> 2,
+        top: (t.bounds.top - target.top) >> 2,
+        right: (t.bounds.right - 1 - target.left) >> 2,
+        bottom: (t.bounds.bottom - 1 - target.top) >> 2,
+    };
+    let small = blocks.right - blocks.left < 2 && blocks.bottom - blocks.top < 2;
     // A small triangle that every block it meets hides is dropped before anything else is computed.
-    let mut blocks = 0u32;
-    if small {
-        for i in 0..4 {
-            let (bx, by) = (if i & 1 == 0 { left } else { right }, if i & 2 == 0 { top } else { bottom });
-            let repeated = (i & 1 != 0 && right == left) || (i & 2 != 0 && bottom == top);
-            if !repeated {
-                let tile = (by >> 2) as usize * target.tiles_x + (bx >> 2) as usize;
-                let block = ((by & 3) * 4 + (bx & 3)) as usize;
-                if !hierarchical || t.depth_max >= target.block_minima(tile)[block] {
-                    blocks |= 1 << i;
-                }
-                if hierarchical && target.visits.is_some() {
-                    target.count_polygon_visit((bx * 4, by * 4), 4, 1);
-                }
-            }
-        }
-        if blocks == 0 {
-            return Filled::default();
-        }
+    let open = if small { open_corners(target, &blocks, t.depth_max, how.hierarchical) } else { 0 };
+    if small && open == 0 {
+        return Filled::default();
     }
-
     let edges = edges(t, target);
     let column = i32x16::from_slice(simd, &COLUMN);
     let row = i32x16::from_slice(simd, &ROW);
@@ -304,41 +287,86 @@ fn fill<S: Simd>(
     };
     let f = &mut filling;
     if small {
-        while blocks != 0 {
-            let i = blocks.trailing_zeros() as i32;
-            blocks &= blocks - 1;
-            let (bx, by) = (if i & 1 == 0 { left } else { right }, if i & 2 == 0 { top } else { bottom });
+        let mut rest = open;
+        while rest != 0 {
+            let (bx, by) = corner_block(&blocks, rest.trailing_zeros() as i32);
+            rest &= rest - 1;
             fill_block(simd, target, f, bx, by, false, is_hole);
         }
     } else {
-        let (left, top, right, bottom) = (left >> 2, top >> 2, right >> 2, bottom >> 2);
-        // Cells whose tiles are few are taken whole.
-        let choose = right - left >= 6 || bottom - top >= 6;
-        for cell_y in top >> 2..=bottom >> 2 {
-            for cell_x in left >> 2..=right >> 2 {
-                let mut tiles = cell_mask(
-                    (left - cell_x * 4).max(0),
-                    (top - cell_y * 4).max(0),
-                    (right - cell_x * 4).min(3),
-                    (bottom - cell_y * 4).min(3),
-                );
-                if choose {
-                    tiles &= tiles_of_cell(simd, target, f, t.depth_max, cell_x, cell_y);
-                }
-                while tiles != 0 {
-                    let c = tiles.trailing_zeros() as i32;
-                    tiles &= tiles - 1;
-                    let (x, y) = (cell_x * 4 + (c & 3), cell_y * 4 + (c >> 2));
-                    fill_tile(simd, target, f, t.depth_max, x, y, is_hole);
-                }
-            }
-        }
+        fill_cells(simd, target, f, t.depth_max, &blocks, is_hole);
     }
     let wrote = filling.wrote;
     if wrote {
         target.surfaces.push(how.id);
     }
     Filled { rasterised: true, wrote }
+}
+
+/// Block `i` of a rectangle (inclusive) of at most 2×2 blocks: bit 0 right, bit 1 bottom.
+#[inline(always)]
+fn corner_block(blocks: &Rect, i: i32) -> (i32, i32) {
+    let x = if i & 1 == 0 { blocks.left } else { blocks.right };
+    let y = if i & 2 == 0 { blocks.top } else { blocks.bottom };
+    (x, y)
+}
+
+/// Which of at most 2×2 blocks do not hide `depth`, each once.
+#[inline(always)]
+fn open_corners(target: &mut Target, blocks: &Rect, depth: f32, hierarchical: bool) -> u32 {
+    let mut open = 0u32;
+    for i in 0..4 {
+        let repeated =
+            (i & 1 != 0 && blocks.right == blocks.left) || (i & 2 != 0 && blocks.bottom == blocks.top);
+        if repeated {
+            continue;
+        }
+        let (bx, by) = corner_block(blocks, i);
+        let tile = (by >> 2) as usize * target.tiles_x + (bx >> 2) as usize;
+        let block = ((by & 3) * 4 + (bx & 3)) as usize;
+        if !hierarchical || depth >= target.block_minima(tile)[block] {
+            open |= 1 << i;
+        }
+        if hierarchical && target.visits.is_some() {
+            target.count_polygon_visit((bx * 4, by * 4), 4, 1);
+        }
+    }
+    open
+}
+
+/// Fills a triangle that meets more than 2×2 blocks, tile by tile; where there are many tiles, 64-pixel
+/// cells choose among theirs first.
+#[inline(always)]
+fn fill_cells<S: Simd>(
+    simd: S,
+    target: &mut Target,
+    f: &mut Filling<S>,
+    depth_max: f32,
+    blocks: &Rect,
+    is_hole: &mut dyn FnMut(i32, i32) -> bool,
+) {
+    let (left, top, right, bottom) =
+        (blocks.left >> 2, blocks.top >> 2, blocks.right >> 2, blocks.bottom >> 2);
+    let choose = right - left >= 6 || bottom - top >= 6;
+    for cell_y in top >> 2..=bottom >> 2 {
+        for cell_x in left >> 2..=right >> 2 {
+            let mut tiles = cell_mask(
+                (left - cell_x * 4).max(0),
+                (top - cell_y * 4).max(0),
+                (right - cell_x * 4).min(3),
+                (bottom - cell_y * 4).min(3),
+            );
+            if choose {
+                tiles &= tiles_of_cell(simd, target, f, depth_max, cell_x, cell_y);
+            }
+            while tiles != 0 {
+                let c = tiles.trailing_zeros() as i32;
+                tiles &= tiles - 1;
+                let (x, y) = (cell_x * 4 + (c & 3), cell_y * 4 + (c >> 2));
+                fill_tile(simd, target, f, depth_max, x, y, is_hole);
+            }
+        }
+    }
 }
 
 const COLUMN: [i32; 16] = [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3];

@@ -321,6 +321,7 @@ impl Target {
         if bits & whole != 0 { Children::Shown } else { Children::Open(bits) }
     }
 
+    #[expect(clippy::too_many_arguments, reason = "the last step of one search, split off to be read")]
     #[inline(always)]
     fn block_shows<S: Simd>(
         &mut self,

@@ -223,9 +223,9 @@ pub(super) fn set_up<S: Simd>(
 fn widen_corners<S: Simd>(simd: S, block: &TriangleBlock) -> [[[f64x8<S>; 3]; 3]; 2] {
     let zero = f64x8::splat(simd, 0.0);
     let mut halves = [[[zero; 3]; 3]; 2];
-    for k in 0..3 {
-        for axis in 0..3 {
-            let (low, high) = simd.widen_f32x16(f32x16::from_slice(simd, &block.corner[k][axis]));
+    for (k, corner) in block.corner.iter().enumerate() {
+        for (axis, lanes) in corner.iter().enumerate() {
+            let (low, high) = simd.widen_f32x16(f32x16::from_slice(simd, lanes));
             halves[0][k][axis] = low;
             halves[1][k][axis] = high;
         }
