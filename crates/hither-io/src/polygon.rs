@@ -257,7 +257,7 @@ pub(crate) fn doubled_area(a: Vec3, b: Vec3, c: Vec3) -> DVec3 {
     (b.as_dvec3() - a).cross(c.as_dvec3() - a)
 }
 
-/// A normal of the polygon's best plane [Newell], or `None` if all corners are on a line.
+/// A normal of the polygon's best plane (Newell), or `None` if all corners are on a line.
 pub(crate) fn normal(points: &[Vec3]) -> Option<DVec3> {
     let fan = || points.windows(2).map(|w| doubled_area(points[0], w[0], w[1]));
     let sum: DVec3 = fan().sum();

@@ -1,5 +1,5 @@
 //! Textbook situations that make sorting hard, each with a camera of its own and a hundred metres from the
-//! next: polygons that penetrate each other, overlap in a cycle, and enclose each other [Crawfis].
+//! next: polygons that penetrate each other, overlap in a cycle, and enclose each other (Crawfis).
 
 use crate::palette::paint;
 use crate::spec::{Values, WorldInfo};
