@@ -232,7 +232,8 @@ mod tests {
     #[test]
     fn every_way_to_write_an_import_is_seen() {
         assert_eq!(
-            refused("raster::pyramid", "use super::super::geometry::Aabb;\nuse super::super::render::x;").len(),
+            refused("raster::pyramid", "use super::super::geometry::Aabb;\nuse super::super::render::x;")
+                .len(),
             1
         );
         assert!(refused("raster::pyramid", "use super::super::raster::tile;\nuse super::tile;").is_empty());

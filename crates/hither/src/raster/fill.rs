@@ -16,7 +16,7 @@
 //! *Depth.* A block's origin is evaluated in f64 from the plane and rounded once; pixels add `a·dx + b·dy`
 //! in f32 and are clamped to the corners' range. These operations depend on the block's place in the
 //! image only, so every path gives the same bits. The bound used to skip a block or tile is the plane's
-//! largest value there plus [`plane_margin`], and never above the corners' largest depth.
+//! largest value there plus `plane_margin`, and never above the corners' largest depth.
 
 use super::clip::clip;
 use super::pyramid::{Rect, Sixteen, Target, cell_mask};
