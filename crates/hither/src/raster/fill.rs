@@ -19,11 +19,11 @@
 //! largest value there plus `plane_margin`, and never above the corners' largest depth.
 
 use super::clip::clip;
-use super::pyramid::{Rect, Sixteen, Target, cell_mask};
+use super::pyramid::{MIXED, Rect, Sixteen, Target, cell_mask};
 use super::setup::{ScreenTriangle, TriangleBlock, set_up};
 use super::transform::ScreenFromObject;
 use crate::conventions::SurfaceId;
-use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
 
 /// How a block of triangles is drawn.
 pub struct Drawing<'a> {
@@ -214,8 +214,14 @@ struct Filling<S: Simd> {
     depth_steps: f32x16<S>,
     depth_min: f32x16<S>,
     depth_max: f32x16<S>,
-    /// Depth plane over window pixels.
+    /// Depth plane over image pixels.
     plane: [f64; 3],
+    /// The least of `depth_steps`, `depth_min` and `depth_max`.
+    least_step: f32,
+    least_depth: f32,
+    most_depth: f32,
+    /// What the plane rises at most from a block's first pixel to another.
+    block_rise: f32,
     slot: u32,
     how: How,
     wrote: bool,
@@ -238,6 +244,26 @@ impl<S: Simd> Filling<S> {
     fn plane_margin(&self, origin: f32, last: f32) -> f32 {
         let slope = (self.plane[0].abs() + self.plane[1].abs()) as f32;
         (origin.abs() + slope * last) * (1.0 / (1 << 20) as f32)
+    }
+
+    /// [`Filling::plane_at`] for the first pixels of the sixteen blocks of the tile at window pixel (x, y): the
+    /// same operations, so the same bits.
+    #[inline(always)]
+    fn plane_at_blocks(&self, simd: S, target: &Target, x: i32, y: i32) -> f32x16<S> {
+        let (x, y) = (f64::from(x + target.left), f64::from(y + target.top));
+        let column = f64x8::from_slice(simd, &BLOCK_COLUMN) + x;
+        let halves = [0, 1].map(|half| {
+            let row = f64x8::from_slice(simd, &BLOCK_ROW[half]) + y;
+            (column * self.plane[0] + row * self.plane[1]) + self.plane[2]
+        });
+        simd.narrow_f64x8(halves[0], halves[1])
+    }
+
+    /// [`Filling::plane_margin`] over blocks.
+    #[inline(always)]
+    fn plane_margins(&self, simd: S, origins: f32x16<S>) -> f32x16<S> {
+        let slope = (self.plane[0].abs() + self.plane[1].abs()) as f32;
+        (origins.abs() + f32x16::splat(simd, slope * 3.0)) * (1.0 / (1 << 20) as f32)
     }
 
     #[inline(always)]
@@ -269,6 +295,8 @@ fn fill<S: Simd>(
     let edges = edges(t, target);
     let column = i32x16::from_slice(simd, &COLUMN);
     let row = i32x16::from_slice(simd, &ROW);
+    let depth_steps = f32x16::from_slice(simd, &COLUMN_F) * t.plane[0] as f32
+        + f32x16::from_slice(simd, &ROW_F) * t.plane[1] as f32;
     let mut filling = Filling {
         edges,
         edge_steps: [
@@ -276,22 +304,37 @@ fn fill<S: Simd>(
             column * edges[1].a + row * edges[1].b,
             column * edges[2].a + row * edges[2].b,
         ],
-        depth_steps: f32x16::from_slice(simd, &COLUMN_F) * t.plane[0] as f32
-            + f32x16::from_slice(simd, &ROW_F) * t.plane[1] as f32,
+        depth_steps,
         depth_min: f32x16::splat(simd, t.depth_min),
         depth_max: f32x16::splat(simd, t.depth_max),
         plane: t.plane,
+        least_step: depth_steps.reduce_min(),
+        least_depth: t.depth_min,
+        most_depth: t.depth_max,
+        block_rise: 0.0,
         slot: target.surfaces.len() as u32,
         how,
         wrote: false,
     };
+    filling.block_rise = filling.plane_rise(3.0);
     let f = &mut filling;
     if small {
         let mut rest = open;
         while rest != 0 {
             let (bx, by) = corner_block(&blocks, rest.trailing_zeros() as i32);
             rest &= rest - 1;
-            fill_block(simd, target, f, bx, by, false, is_hole);
+            let (x, y) = (bx * 4, by * 4);
+            let mut outside = i32x16::splat(simd, 0);
+            for k in 0..3 {
+                outside |= f.edge_steps[k] + f.edges[k].at_saturated(x, y);
+            }
+            let covered = !(outside.simd_lt(i32x16::splat(simd, 0)).to_bitmask() as u32) & 0xFFFF;
+            let tile = (by >> 2) as usize * target.tiles_x + (bx >> 2) as usize;
+            let block = ((by & 3) * 4 + (bx & 3)) as usize;
+            let origin = f.plane_at(target, x, y);
+            if fill_block(simd, target, f, tile, block, (x, y), origin, covered, is_hole) {
+                target.mark_stale(tile);
+            }
         }
     } else {
         fill_cells(simd, target, f, t.depth_max, &blocks, is_hole);
@@ -347,7 +390,7 @@ fn fill_cells<S: Simd>(
 ) {
     let (left, top, right, bottom) =
         (blocks.left >> 2, blocks.top >> 2, blocks.right >> 2, blocks.bottom >> 2);
-    let choose = right - left >= 6 || bottom - top >= 6;
+    let choose = (right - left + 1) * (bottom - top + 1) > CHOOSE;
     for cell_y in top >> 2..=bottom >> 2 {
         for cell_x in left >> 2..=right >> 2 {
             let mut tiles = cell_mask(
@@ -369,8 +412,13 @@ fn fill_cells<S: Simd>(
     }
 }
 
+/// With more tiles than this in a triangle's rectangle, it pays to ask first which of them it meets.
+const CHOOSE: i32 = 3;
+
 const COLUMN: [i32; 16] = [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3];
 const ROW: [i32; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3];
+const BLOCK_COLUMN: [f64; 8] = [0., 4., 8., 12., 0., 4., 8., 12.];
+const BLOCK_ROW: [[f64; 8]; 2] = [[0., 0., 0., 0., 4., 4., 4., 4.], [8., 8., 8., 8., 12., 12., 12., 12.]];
 const COLUMN_F: [f32; 16] = [0., 1., 2., 3., 0., 1., 2., 3., 0., 1., 2., 3., 0., 1., 2., 3.];
 const ROW_F: [f32; 16] = [0., 0., 0., 0., 1., 1., 1., 1., 2., 2., 2., 2., 3., 3., 3., 3.];
 
@@ -420,66 +468,76 @@ fn fill_tile<S: Simd>(
 ) {
     let tile = tile_y as usize * target.tiles_x + tile_x as usize;
     let (x, y) = (tile_x * 16, tile_y * 16);
-    let mut outside = i32x16::splat(simd, 0);
-    let mut partial = i32x16::splat(simd, 0);
+    let zero = i32x16::splat(simd, 0);
+    let (mut outside, mut partial) = (zero, zero);
+    let mut at_blocks = [[0i32; 16]; 3];
     for k in 0..3 {
         let (edge, steps) = (&f.edges[k], f.edge_steps[k]);
-        let at_blocks = (steps << 2) + edge.at_saturated(x, y);
-        outside |= at_blocks + edge.reach_up(3);
-        partial |= at_blocks + edge.reach_down(3);
+        // Saturated at the tile's origin, and steps within a tile need 28 bits: signs stay right.
+        let at = (steps << 2) + edge.at_saturated(x, y);
+        outside |= at + edge.reach_up(3);
+        partial |= at + edge.reach_down(3);
+        at.store_slice(&mut at_blocks[k]);
     }
-    let zero = i32x16::splat(simd, 0);
     let mut blocks = !(outside.simd_lt(zero).to_bitmask() as u32) & 0xFFFF;
     let whole = !(partial.simd_lt(zero).to_bitmask() as u32);
+    let origins = f.plane_at_blocks(simd, target, x, y);
     if f.how.hierarchical {
-        let z = f.plane_at(target, x, y);
-        let bound = z + f.plane_rise(3.0) + f.plane_margin(z, 15.0);
-        let bounds = (f.depth_steps * 4.0 + bound).min(f32x16::splat(simd, depth_max));
+        let bounds = (origins + f.plane_margins(simd, origins) + f.block_rise).min(f32x16::splat(simd, depth_max));
         let minima = f32x16::from_slice(simd, target.block_minima(tile));
         blocks &= bounds.simd_ge(minima).to_bitmask() as u32;
         if target.visits.is_some() {
             target.count_polygon_visit((x, y), 4, 0xFFFF);
         }
     }
+    let mut at_origins = [0f32; 16];
+    origins.store_slice(&mut at_origins);
+    let mut raised = false;
     while blocks != 0 {
-        let c = blocks.trailing_zeros() as i32;
+        let c = blocks.trailing_zeros() as usize;
         blocks &= blocks - 1;
-        let (bx, by) = (tile_x * 4 + (c & 3), tile_y * 4 + (c >> 2));
-        fill_block(simd, target, f, bx, by, whole & (1 << c) != 0, is_hole);
+        let covered = if whole & (1 << c) != 0 {
+            0xFFFF
+        } else {
+            let mut outside = zero;
+            for k in 0..3 {
+                outside |= f.edge_steps[k] + at_blocks[k][c];
+            }
+            !(outside.simd_lt(zero).to_bitmask() as u32) & 0xFFFF
+        };
+        let corner = (x + (c as i32 & 3) * 4, y + (c as i32 >> 2) * 4);
+        raised |= fill_block(simd, target, f, tile, c, corner, at_origins[c], covered, is_hole);
+    }
+    if raised {
+        target.mark_stale(tile);
     }
 }
 
+#[expect(clippy::too_many_arguments, reason = "the inner step of two loops, split off to be written once")]
+/// Writes the pixels of block `block` of `tile` that are `covered` and nearer than what they hold; `origin` is
+/// the plane at the block's first pixel, window pixel `corner`. Returns whether the block's minimum rose: what
+/// lies above it in the pyramid is then to be marked stale.
 #[inline(always)]
 fn fill_block<S: Simd>(
     simd: S,
     target: &mut Target,
     f: &mut Filling<S>,
-    block_x: i32,
-    block_y: i32,
-    whole: bool,
+    tile: usize,
+    block: usize,
+    corner: (i32, i32),
+    origin: f32,
+    covered: u32,
     is_hole: &mut dyn FnMut(i32, i32) -> bool,
-) {
-    let tile = (block_y >> 2) as usize * target.tiles_x + (block_x >> 2) as usize;
-    let block = ((block_y & 3) * 4 + (block_x & 3)) as usize;
-    let (x, y) = (block_x * 4, block_y * 4);
-    let covered = if whole {
-        0xFFFF
-    } else {
-        let mut outside = i32x16::splat(simd, 0);
-        for k in 0..3 {
-            outside |= f.edge_steps[k] + f.edges[k].at_saturated(x, y);
-        }
-        !(outside.simd_lt(i32x16::splat(simd, 0)).to_bitmask() as u32) & 0xFFFF
-    };
+) -> bool {
     if target.visits.is_some() {
-        target.count_polygon_visit((x, y), 1, covered);
+        target.count_polygon_visit(corner, 1, covered);
     }
     if covered == 0 {
-        return;
+        return false;
     }
     target.touch(tile);
     let at = tile * 16 + block;
-    let z = (f.depth_steps + f.plane_at(target, x, y)).max(f.depth_min).min(f.depth_max);
+    let z = (f.depth_steps + origin).max(f.depth_min).min(f.depth_max);
     let old = f32x16::from_slice(simd, &target.depth[at].0);
     let mut write = z.simd_gt(old).to_bitmask() as u32 & covered;
     let tied = z.simd_eq(old).to_bitmask() as u32 & covered;
@@ -490,26 +548,44 @@ fn fill_block<S: Simd>(
     if f.how.masked {
         let candidates = write;
         for p in (0..16).filter(|p| candidates & (1 << p) != 0) {
-            if is_hole(target.left + x + (p & 3), target.top + y + (p >> 2)) {
+            if is_hole(target.left + corner.0 + (p & 3), target.top + corner.1 + (p >> 2)) {
                 write &= !(1 << p);
             }
         }
     }
     if write == 0 {
-        return;
+        return false;
     }
     f.wrote = true;
     target.counters.pixels_written += u64::from(write.count_ones());
+    if write == 0xFFFF {
+        z.store_slice(&mut target.depth[at].0);
+        target.block_id[at] = f.slot;
+        if !f.how.hierarchical {
+            return false;
+        }
+        // Rounding is monotonic, so the least pixel is the one with the least step.
+        let min = (origin + f.least_step).max(f.least_depth).min(f.most_depth);
+        return target.raise_block_minimum(tile, block, min);
+    }
     let mask = mask32x16::from_bitmask(simd, u64::from(write));
     let new = mask.select(z, old);
     new.store_slice(&mut target.depth[at].0);
+    let slots = u32x16::splat(simd, f.slot);
     let ids: &mut Sixteen<u32> = &mut target.id[at];
-    let old_ids = fearless_simd::u32x16::from_slice(simd, &ids.0);
-    mask.select(fearless_simd::u32x16::splat(simd, f.slot), old_ids).store_slice(&mut ids.0);
-    if f.how.hierarchical {
-        let min = new.reduce_min();
-        target.raise_block_minimum(tile, block, min);
+    let shared = std::mem::replace(&mut target.block_id[at], MIXED);
+    let old_ids =
+        if shared == MIXED { u32x16::from_slice(simd, &ids.0) } else { u32x16::splat(simd, shared) };
+    mask.select(slots, old_ids).store_slice(&mut ids.0);
+    if !f.how.hierarchical {
+        return false;
     }
+    // As long as one of the farthest pixels stays, so does the minimum.
+    let least = target.block_minima(tile)[block];
+    if old.simd_eq(f32x16::splat(simd, least)).to_bitmask() as u32 & !write & 0xFFFF != 0 {
+        return false;
+    }
+    target.raise_block_minimum(tile, block, new.reduce_min())
 }
 
 /// Fills a triangle that covers one pixel: the operations of [`fill_block`] on one lane.
@@ -538,17 +614,23 @@ fn fill_pixel<S: Simd>(
     let step = (x & 3) as f32 * t.plane[0] as f32 + (y & 3) as f32 * t.plane[1] as f32;
     let z = (step + origin).max(t.depth_min).min(t.depth_max);
     let old = target.depth[at].0[pixel];
-    let wins = z > old || (z == old && z > 0.0 && id < target.surfaces[target.id[at].0[pixel] as usize]);
+    let wins = z > old || (z == old && z > 0.0 && id < target.surface_in(at, pixel));
     if !wins {
         return false;
     }
     target.depth[at].0[pixel] = z;
+    let shared = std::mem::replace(&mut target.block_id[at], MIXED);
+    if shared != MIXED {
+        target.id[at] = Sixteen([shared; 16]);
+    }
     target.id[at].0[pixel] = target.surfaces.len() as u32;
     target.surfaces.push(id);
     target.counters.pixels_written += 1;
     if hierarchical && old == block_min {
         let min = f32x16::from_slice(simd, &target.depth[at].0).reduce_min();
-        target.raise_block_minimum(tile, block, min);
+        if target.raise_block_minimum(tile, block, min) {
+            target.mark_stale(tile);
+        }
     }
     true
 }
@@ -558,6 +640,6 @@ fn fill_pixel<S: Simd>(
 fn win_ties(target: &Target, id: SurfaceId, at: usize, tied: u32, drawn: u32) -> u32 {
     (0..16)
         .filter(|p| tied & drawn & (1 << p) != 0)
-        .filter(|&p| id < target.surfaces[target.id[at].0[p] as usize])
+        .filter(|&p| id < target.surface_in(at, p))
         .fold(0, |won, p| won | 1 << p)
 }

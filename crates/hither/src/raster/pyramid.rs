@@ -69,7 +69,10 @@ pub struct Target {
     pub counters: TargetCounters,
     pub(super) tiles_x: usize,
     pub(super) depth: Vec<Sixteen<f32>>,
+    /// Of each pixel; meaningless in a block that `block_id` speaks for.
     pub(super) id: Vec<Sixteen<u32>>,
+    /// The id that all pixels of a block share, or [`MIXED`]: most blocks never need their sixteen.
+    pub(super) block_id: Vec<u32>,
     touched: Vec<bool>,
     levels: Vec<PyramidLevel>,
     /// What the numbers in `id` stand for.
@@ -114,6 +117,7 @@ impl Target {
 
             depth: vec![Sixteen([0.0; 16]); blocks],
             id: vec![Sixteen([0; 16]); blocks],
+            block_id: vec![MIXED; blocks],
             touched: vec![false; tiles_x * tiles_y],
             levels,
             surfaces: Vec::new(),
@@ -168,7 +172,15 @@ impl Target {
     pub fn surface_at(&self, x: u32, y: u32) -> Option<SurfaceId> {
         let (block, pixel) = self.locate(x, y);
         let drawn = self.touched[block / 16] && self.depth[block].0[pixel] > 0.0;
-        drawn.then(|| self.surfaces[self.id[block].0[pixel] as usize])
+        drawn.then(|| self.surface_in(block, pixel))
+    }
+
+    /// The surface at a pixel of a block, where one was drawn.
+    #[inline(always)]
+    pub(super) fn surface_in(&self, block: usize, pixel: usize) -> SurfaceId {
+        let shared = self.block_id[block];
+        let id = if shared == MIXED { self.id[block].0[pixel] } else { shared };
+        self.surfaces[id as usize]
     }
 
     fn locate(&self, x: u32, y: u32) -> (usize, usize) {
@@ -196,16 +208,27 @@ impl Target {
         if left > right || top > bottom {
             return true;
         }
+        let rect = [left, top, right, bottom];
+        let extent = (right - left).max(bottom - top) as u32;
+        if extent < 16 {
+            // Most boxes are small: they ask the minima of at most 2×2 tiles, which are never stale.
+            for tile_y in (top >> 4)..=(bottom >> 4) {
+                for tile_x in (left >> 4)..=(right >> 4) {
+                    if self.shows_in_tile(simd, tile_x, tile_y, rect, depth) {
+                        return false;
+                    }
+                }
+            }
+            return true;
+        }
         // Finest level at which the rectangle meets at most 2×2 parents: parents at level k have side
         // 4^(k+2), and an extent below 4^(k+2) touches at most two of them.
-        let extent = (right - left).max(bottom - top) as u32;
         let log4 = (31 - (extent | 15).leading_zeros()) / 2;
         let top_level = (log4 as usize - 1).min(self.levels.len() - 1);
         let shift = 2 * (top_level as u32 + 2);
         for parent_y in (top >> shift)..=(bottom >> shift) {
             for parent_x in (left >> shift)..=(right >> shift) {
-                let inner = [left, top, right, bottom];
-                if self.shows_in(simd, top_level, parent_x as usize, parent_y as usize, inner, depth) {
+                if self.shows_in(simd, top_level, parent_x as usize, parent_y as usize, rect, depth) {
                     return false;
                 }
             }
@@ -226,6 +249,33 @@ impl Target {
         let shift = 2 * (level + 1);
         let (x, y) = ((left >> shift) as usize, (top >> shift) as usize);
         samples.min[(y >> 2) * samples.columns + (x >> 2)].0[(y & 3) * 4 + (x & 3)] > depth
+    }
+
+    /// Whether some pixel of `[left, top, right, bottom]` (inclusive) inside this tile holds `depth` or
+    /// something farther.
+    #[inline(always)]
+    fn shows_in_tile<S: Simd>(
+        &mut self,
+        simd: S,
+        tile_x: i32,
+        tile_y: i32,
+        rect: [i32; 4],
+        depth: f32,
+    ) -> bool {
+        let mut bits = match self.open_children(simd, 0, tile_x as u32, tile_y as u32, rect, depth) {
+            Children::Shown => return true,
+            Children::Open(bits) => bits,
+        };
+        let tile = tile_y as usize * self.tiles_x + tile_x as usize;
+        while bits != 0 {
+            let c = bits.trailing_zeros() as i32;
+            bits &= bits - 1;
+            let (bx, by) = (tile_x * 4 + (c & 3), tile_y * 4 + (c >> 2));
+            if self.block_shows(simd, tile, c as usize, bx, by, rect, depth) {
+                return true;
+            }
+        }
+        false
     }
 
     /// Whether some pixel of `[left, top, right, bottom]` (inclusive) inside this parent cell holds
@@ -292,7 +342,7 @@ impl Target {
         depth: f32,
     ) -> Children {
         let parent = py as usize * self.levels[level].columns + px as usize;
-        if self.levels[level].stale[parent] != 0 {
+        if level > 0 && self.levels[level].stale[parent] != 0 {
             self.refresh(simd, level, parent);
         }
         let shift = 2 * (level as u32 + 1);
@@ -378,18 +428,20 @@ impl Target {
         Some(&self.levels[1].min[parent].0)
     }
 
-    /// Records a block's new minimum, higher than before.
+    /// Records a block's minimum; returns whether it rose, and [`Target::mark_stale`] is due.
     #[inline(always)]
-    pub(super) fn raise_block_minimum(&mut self, tile: usize, block: usize, min: f32) {
-        let old = self.levels[0].min[tile].0[block];
-        if min > old {
-            self.levels[0].min[tile].0[block] = min;
-            self.mark_stale(tile);
+    pub(super) fn raise_block_minimum(&mut self, tile: usize, block: usize, min: f32) -> bool {
+        let old = &mut self.levels[0].min[tile].0[block];
+        let rises = min > *old;
+        if rises {
+            *old = min;
         }
+        rises
     }
 
+    /// What lies above a tile whose blocks' minima rose is out of date.
     #[inline(always)]
-    fn mark_stale(&mut self, tile: usize) {
+    pub(super) fn mark_stale(&mut self, tile: usize) {
         let (mut x, mut y) = (tile % self.tiles_x, tile / self.tiles_x);
         for level in &mut self.levels[1..] {
             let parent = (y >> 2) * level.columns + (x >> 2);
@@ -454,6 +506,9 @@ impl Target {
         }
     }
 }
+
+/// No id: a block's pixels have their own.
+pub(super) const MIXED: u32 = u32::MAX;
 
 /// What a parent's children say of a rectangle at a depth.
 enum Children {
