@@ -35,6 +35,17 @@ pub struct Drawing<'a> {
     pub hierarchical: bool,
 }
 
+impl Drawing<'_> {
+    #[inline(always)]
+    fn of_lane(&self, block: &TriangleBlock, lane: usize) -> How {
+        How {
+            id: SurfaceId { instance: self.instance, triangle: block.triangle[lane] },
+            hierarchical: self.hierarchical,
+            masked: block.masked & (1 << lane) != 0,
+        }
+    }
+}
+
 /// What drawing one block of triangles came to.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BlockCounts {
@@ -70,10 +81,18 @@ pub fn draw_block<S: Simd>(
         let lane = rest.trailing_zeros() as usize;
         rest &= rest - 1;
         let triangle = lanes.get(lane);
-        if lanes.single & !block.masked & (1 << lane) != 0 {
-            let id = SurfaceId { instance: drawing.instance, triangle: block.triangle[lane] };
-            counts.drawn += 1;
-            counts.wrote |= fill_pixel(simd, target, &triangle, id, drawing.hierarchical);
+        let how = drawing.of_lane(block, lane);
+        if lanes.tiny & (1 << lane) != 0 {
+            let covers = lanes.covers.map(|pixel| u32::from(pixel >> lane & 1));
+            let filled = fill_tiny(simd, target, &triangle, how, covers, &mut |x, y| is_hole(lane, x, y));
+            counts.drawn += u32::from(filled.rasterised);
+            counts.wrote |= filled.wrote;
+            continue;
+        }
+        if is_small(&triangle, target) {
+            let filled = fill_small(simd, target, &triangle, how, &mut |x, y| is_hole(lane, x, y));
+            counts.drawn += u32::from(filled.rasterised);
+            counts.wrote |= filled.wrote;
             continue;
         }
         draw_lane(simd, target, block, drawing, lane, &triangle, is_hole, &mut counts);
@@ -128,11 +147,7 @@ fn draw_lane<S: Simd>(
     is_hole: &mut dyn FnMut(usize, i32, i32) -> bool,
     counts: &mut BlockCounts,
 ) {
-    let how = How {
-        id: SurfaceId { instance: drawing.instance, triangle: block.triangle[lane] },
-        hierarchical: drawing.hierarchical,
-        masked: block.masked & (1 << lane) != 0,
-    };
+    let how = drawing.of_lane(block, lane);
     let mut hole = |x: i32, y: i32| is_hole(lane, x, y);
     // A function of its own: one copy of the code for each instruction set.
     let drawn = simd.vectorize(
@@ -211,23 +226,44 @@ fn edge(t: &ScreenTriangle, target: &Target, i: usize, j: usize) -> Edge {
 struct Filling<S: Simd> {
     edges: [Edge; 3],
     edge_steps: [i32x16<S>; 3],
-    depth_steps: f32x16<S>,
-    depth_min: f32x16<S>,
-    depth_max: f32x16<S>,
-    /// Depth plane over image pixels.
-    plane: [f64; 3],
-    /// The least of `depth_steps`, `depth_min` and `depth_max`.
-    least_step: f32,
-    least_depth: f32,
-    most_depth: f32,
+    paint: Paint<S>,
     /// What the plane rises at most from a block's first pixel to another.
     block_rise: f32,
+}
+
+/// What a triangle's pixels get: depths, and a surface.
+struct Paint<S: Simd> {
+    /// Depth plane over image pixels.
+    plane: [f64; 3],
+    /// From a block's first pixel to the others.
+    depth_steps: f32x16<S>,
+    /// The least of them.
+    least_step: f32,
+    /// Every depth is clamped to this range.
+    depth_min: f32,
+    depth_max: f32,
     slot: u32,
     how: How,
     wrote: bool,
 }
 
-impl<S: Simd> Filling<S> {
+impl<S: Simd> Paint<S> {
+    #[inline(always)]
+    fn new(simd: S, target: &Target, t: &ScreenTriangle, how: How) -> Paint<S> {
+        let [a, b] = [t.plane[0] as f32, t.plane[1] as f32];
+        let least = |slope: f32| if slope < 0.0 { 3.0 * slope } else { 0.0 };
+        Paint {
+            plane: t.plane,
+            depth_steps: f32x16::from_slice(simd, &COLUMN_F) * a + f32x16::from_slice(simd, &ROW_F) * b,
+            least_step: least(a) + least(b),
+            depth_min: t.depth_min,
+            depth_max: t.depth_max,
+            slot: target.surfaces.len() as u32,
+            how,
+            wrote: false,
+        }
+    }
+
     /// The plane at a window pixel, rounded once. Blocks pass their first pixel.
     ///
     /// The bits must not depend on the window: `plane` is shifted by whole multiples of 16 pixels, which
@@ -246,20 +282,20 @@ impl<S: Simd> Filling<S> {
         (origin.abs() + slope * last) * (1.0 / (1 << 20) as f32)
     }
 
-    /// [`Filling::plane_at`] for the first pixels of the sixteen blocks of the tile at window pixel (x, y): the
+    /// [`Paint::plane_at`] for the first pixels of the sixteen blocks of the tile at window pixel (x, y): the
     /// same operations, so the same bits.
     #[inline(always)]
     fn plane_at_blocks(&self, simd: S, target: &Target, x: i32, y: i32) -> f32x16<S> {
         let (x, y) = (f64::from(x + target.left), f64::from(y + target.top));
-        let column = f64x8::from_slice(simd, &BLOCK_COLUMN) + x;
-        let halves = [0, 1].map(|half| {
-            let row = f64x8::from_slice(simd, &BLOCK_ROW[half]) + y;
-            (column * self.plane[0] + row * self.plane[1]) + self.plane[2]
-        });
+        // Written out: closures are not always inlined into code for one instruction set.
+        let columns = (f64x8::from_slice(simd, &BLOCK_COLUMN) + x) * self.plane[0];
+        let upper = (f64x8::from_slice(simd, &BLOCK_ROW[0]) + y) * self.plane[1];
+        let lower = (f64x8::from_slice(simd, &BLOCK_ROW[1]) + y) * self.plane[1];
+        let halves = [(columns + upper) + self.plane[2], (columns + lower) + self.plane[2]];
         simd.narrow_f64x8(halves[0], halves[1])
     }
 
-    /// [`Filling::plane_margin`] over blocks.
+    /// [`Paint::plane_margin`] over blocks.
     #[inline(always)]
     fn plane_margins(&self, simd: S, origins: f32x16<S>) -> f32x16<S> {
         let slope = (self.plane[0].abs() + self.plane[1].abs()) as f32;
@@ -272,6 +308,139 @@ impl<S: Simd> Filling<S> {
     }
 }
 
+/// The blocks (inclusive) that a triangle's bounds meet, of the window.
+#[inline(always)]
+fn blocks_of(t: &ScreenTriangle, target: &Target) -> Rect {
+    Rect {
+        left: (t.bounds.left - target.left) >> 2,
+        top: (t.bounds.top - target.top) >> 2,
+        right: (t.bounds.right - 1 - target.left) >> 2,
+        bottom: (t.bounds.bottom - 1 - target.top) >> 2,
+    }
+}
+
+/// Whether a triangle meets at most 2×2 blocks, and its edge functions there fit into 32 bits: sides of 64
+/// pixels, seen from 72 pixels away, make products below 2²⁹.
+#[inline(always)]
+fn is_small(t: &ScreenTriangle, target: &Target) -> bool {
+    let blocks = blocks_of(t, target);
+    let extent = |v: &[i32; 3]| v[0].max(v[1]).max(v[2]) - v[0].min(v[1]).min(v[2]);
+    blocks.right - blocks.left < 2
+        && blocks.bottom - blocks.top < 2
+        && extent(&t.x) <= 64 * 256
+        && extent(&t.y) <= 64 * 256
+}
+
+/// Fills a triangle whose bounds hold at most 2×2 pixels, of which it covers those that `covers` names with a
+/// 1: left and right at the top, left and right at the bottom.
+#[inline(always)]
+fn fill_tiny<S: Simd>(
+    simd: S,
+    target: &mut Target,
+    t: &ScreenTriangle,
+    how: How,
+    covers: [u32; 4],
+    is_hole: &mut dyn FnMut(i32, i32) -> bool,
+) -> Filled {
+    // Unclipped: the bounds may begin beyond the window.
+    let first = |v: &[i32; 3]| (v[0].min(v[1]).min(v[2]) + 127) >> 8;
+    let (x, y) = (first(&t.x) - target.left, first(&t.y) - target.top);
+    let (right, bottom) = (x & 3 == 3, y & 3 == 3);
+    let [a, b, c, d] = covers;
+    let at = (x & 3) + (y & 3) * 4;
+    // Most lie in one block; else in two or four.
+    let pieces = match (right, bottom) {
+        (false, false) => [(x, y, (a | b << 1 | c << 4 | d << 5) << at), NONE, NONE, NONE],
+        (true, false) => {
+            let row = (y & 3) * 4;
+            [(x, y, (a | c << 4) << at), (x + 1, y, (b | d << 4) << row), NONE, NONE]
+        }
+        (false, true) => [(x, y, (a | b << 1) << at), (x, y + 1, (c | d << 1) << (x & 3)), NONE, NONE],
+        (true, true) => [(x, y, a << 15), (x + 1, y, b << 12), (x, y + 1, c << 3), (x + 1, y + 1, d)],
+    };
+    let mut paint = Paint::new(simd, target, t, how);
+    let mut rasterised = false;
+    for (x, y, covered) in pieces {
+        let inside = x >= 0 && y >= 0 && x < target.width && y < target.height;
+        if covered == 0 || !inside {
+            continue;
+        }
+        let (bx, by) = (x >> 2, y >> 2);
+        let tile = (by >> 2) as usize * target.tiles_x + (bx >> 2) as usize;
+        let block = ((by & 3) * 4 + (bx & 3)) as usize;
+        if how.hierarchical && t.depth_max < target.block_minima(tile)[block] {
+            continue;
+        }
+        rasterised = true;
+        let origin = paint.plane_at(target, bx * 4, by * 4);
+        if fill_block(simd, target, &mut paint, tile, block, (bx * 4, by * 4), origin, covered, is_hole) {
+            target.mark_stale(tile);
+        }
+    }
+    if paint.wrote {
+        target.surfaces.push(how.id);
+    }
+    Filled { rasterised, wrote: paint.wrote }
+}
+
+/// No part of a tiny triangle.
+const NONE: (i32, i32, u32) = (0, 0, 0);
+
+/// Fills a triangle that [`is_small`].
+#[inline(always)]
+fn fill_small<S: Simd>(
+    simd: S,
+    target: &mut Target,
+    t: &ScreenTriangle,
+    how: How,
+    is_hole: &mut dyn FnMut(i32, i32) -> bool,
+) -> Filled {
+    let blocks = blocks_of(t, target);
+    // One that every block it meets hides is dropped before anything else is computed.
+    let mut open = open_corners(target, &blocks, t.depth_max, how.hierarchical);
+    if open == 0 {
+        return Filled::default();
+    }
+    let column = i32x16::from_slice(simd, &COLUMN);
+    let row = i32x16::from_slice(simd, &ROW);
+    let mut steps = [column; 3];
+    let mut edges = [(0, 0, 0); 3];
+    let from_x = 128 + 256 * (target.left + blocks.left * 4);
+    let from_y = 128 + 256 * (target.top + blocks.top * 4);
+    for k in 0..3 {
+        let next = (k + 1) % 3;
+        let (dx, dy) = (t.x[next] - t.x[k], t.y[next] - t.y[k]);
+        let owned = dy < 0 || (dy == 0 && dx > 0);
+        let c = (dx * (from_y - t.y[k]) - dy * (from_x - t.x[k]) - i32::from(!owned)) >> 8;
+        steps[k] = row * dx - column * dy;
+        edges[k] = (-dy * 4, dx * 4, c);
+    }
+    let mut paint = Paint::new(simd, target, t, how);
+    while open != 0 {
+        let i = open.trailing_zeros() as i32;
+        open &= open - 1;
+        let (bx, by) = corner_block(&blocks, i);
+        let mut outside = i32x16::splat(simd, 0);
+        for k in 0..3 {
+            let (a, b, c) = edges[k];
+            outside |= steps[k] + (c + a * (i & 1) + b * (i >> 1));
+        }
+        let covered = !(outside.simd_lt(i32x16::splat(simd, 0)).to_bitmask() as u32) & 0xFFFF;
+        let tile = (by >> 2) as usize * target.tiles_x + (bx >> 2) as usize;
+        let block = ((by & 3) * 4 + (bx & 3)) as usize;
+        let origin = paint.plane_at(target, bx * 4, by * 4);
+        let corner = (bx * 4, by * 4);
+        if fill_block(simd, target, &mut paint, tile, block, corner, origin, covered, is_hole) {
+            target.mark_stale(tile);
+        }
+    }
+    if paint.wrote {
+        target.surfaces.push(how.id);
+    }
+    Filled { rasterised: true, wrote: paint.wrote }
+}
+
+/// Fills a triangle of any size.
 #[inline(always)]
 fn fill<S: Simd>(
     simd: S,
@@ -280,23 +449,10 @@ fn fill<S: Simd>(
     how: How,
     is_hole: &mut dyn FnMut(i32, i32) -> bool,
 ) -> Filled {
-    let blocks = Rect {
-        left: (t.bounds.left - target.left) >> 2,
-        top: (t.bounds.top - target.top) >> 2,
-        right: (t.bounds.right - 1 - target.left) >> 2,
-        bottom: (t.bounds.bottom - 1 - target.top) >> 2,
-    };
-    let small = blocks.right - blocks.left < 2 && blocks.bottom - blocks.top < 2;
-    // A small triangle that every block it meets hides is dropped before anything else is computed.
-    let open = if small { open_corners(target, &blocks, t.depth_max, how.hierarchical) } else { 0 };
-    if small && open == 0 {
-        return Filled::default();
-    }
     let edges = edges(t, target);
     let column = i32x16::from_slice(simd, &COLUMN);
     let row = i32x16::from_slice(simd, &ROW);
-    let depth_steps = f32x16::from_slice(simd, &COLUMN_F) * t.plane[0] as f32
-        + f32x16::from_slice(simd, &ROW_F) * t.plane[1] as f32;
+    let paint = Paint::new(simd, target, t, how);
     let mut filling = Filling {
         edges,
         edge_steps: [
@@ -304,42 +460,11 @@ fn fill<S: Simd>(
             column * edges[1].a + row * edges[1].b,
             column * edges[2].a + row * edges[2].b,
         ],
-        depth_steps,
-        depth_min: f32x16::splat(simd, t.depth_min),
-        depth_max: f32x16::splat(simd, t.depth_max),
-        plane: t.plane,
-        least_step: depth_steps.reduce_min(),
-        least_depth: t.depth_min,
-        most_depth: t.depth_max,
-        block_rise: 0.0,
-        slot: target.surfaces.len() as u32,
-        how,
-        wrote: false,
+        block_rise: paint.plane_rise(3.0),
+        paint,
     };
-    filling.block_rise = filling.plane_rise(3.0);
-    let f = &mut filling;
-    if small {
-        let mut rest = open;
-        while rest != 0 {
-            let (bx, by) = corner_block(&blocks, rest.trailing_zeros() as i32);
-            rest &= rest - 1;
-            let (x, y) = (bx * 4, by * 4);
-            let mut outside = i32x16::splat(simd, 0);
-            for k in 0..3 {
-                outside |= f.edge_steps[k] + f.edges[k].at_saturated(x, y);
-            }
-            let covered = !(outside.simd_lt(i32x16::splat(simd, 0)).to_bitmask() as u32) & 0xFFFF;
-            let tile = (by >> 2) as usize * target.tiles_x + (bx >> 2) as usize;
-            let block = ((by & 3) * 4 + (bx & 3)) as usize;
-            let origin = f.plane_at(target, x, y);
-            if fill_block(simd, target, f, tile, block, (x, y), origin, covered, is_hole) {
-                target.mark_stale(tile);
-            }
-        }
-    } else {
-        fill_cells(simd, target, f, t.depth_max, &blocks, is_hole);
-    }
-    let wrote = filling.wrote;
+    fill_cells(simd, target, &mut filling, t.depth_max, &blocks_of(t, target), is_hole);
+    let wrote = filling.paint.wrote;
     if wrote {
         target.surfaces.push(how.id);
     }
@@ -441,16 +566,16 @@ fn tiles_of_cell<S: Simd>(
         outside |= steps + origin;
     }
     let mut tiles = !(outside.simd_lt(i32x16::splat(simd, 0)).to_bitmask() as u32) & 0xFFFF;
-    if f.how.hierarchical {
-        let z = f.plane_at(target, cell_x * 64, cell_y * 64);
-        let bound = z + f.plane_rise(15.0) + f.plane_margin(z, 63.0);
-        let bounds = (f.depth_steps * 16.0 + bound).min(f32x16::splat(simd, depth_max));
+    if f.paint.how.hierarchical {
+        let z = f.paint.plane_at(target, cell_x * 64, cell_y * 64);
+        let bound = z + f.paint.plane_rise(15.0) + f.paint.plane_margin(z, 63.0);
+        let bounds = (f.paint.depth_steps * 16.0 + bound).min(f32x16::splat(simd, depth_max));
         if let Some(minima) = target.tile_minima(simd, cell_x as usize, cell_y as usize) {
             let minima = f32x16::from_slice(simd, minima);
             tiles &= bounds.simd_ge(minima).to_bitmask() as u32;
         }
     }
-    if target.visits.is_some() && f.how.hierarchical {
+    if target.visits.is_some() && f.paint.how.hierarchical {
         target.count_polygon_visit((cell_x * 64, cell_y * 64), 16, 0xFFFF);
     }
     tiles
@@ -481,9 +606,9 @@ fn fill_tile<S: Simd>(
     }
     let mut blocks = !(outside.simd_lt(zero).to_bitmask() as u32) & 0xFFFF;
     let whole = !(partial.simd_lt(zero).to_bitmask() as u32);
-    let origins = f.plane_at_blocks(simd, target, x, y);
-    if f.how.hierarchical {
-        let bounds = (origins + f.plane_margins(simd, origins) + f.block_rise).min(f32x16::splat(simd, depth_max));
+    let origins = f.paint.plane_at_blocks(simd, target, x, y);
+    if f.paint.how.hierarchical {
+        let bounds = (origins + f.paint.plane_margins(simd, origins) + f.block_rise).min(f32x16::splat(simd, depth_max));
         let minima = f32x16::from_slice(simd, target.block_minima(tile));
         blocks &= bounds.simd_ge(minima).to_bitmask() as u32;
         if target.visits.is_some() {
@@ -506,7 +631,7 @@ fn fill_tile<S: Simd>(
             !(outside.simd_lt(zero).to_bitmask() as u32) & 0xFFFF
         };
         let corner = (x + (c as i32 & 3) * 4, y + (c as i32 >> 2) * 4);
-        raised |= fill_block(simd, target, f, tile, c, corner, at_origins[c], covered, is_hole);
+        raised |= fill_block(simd, target, &mut f.paint, tile, c, corner, at_origins[c], covered, is_hole);
     }
     if raised {
         target.mark_stale(tile);
@@ -521,7 +646,7 @@ fn fill_tile<S: Simd>(
 fn fill_block<S: Simd>(
     simd: S,
     target: &mut Target,
-    f: &mut Filling<S>,
+    paint: &mut Paint<S>,
     tile: usize,
     block: usize,
     corner: (i32, i32),
@@ -537,15 +662,17 @@ fn fill_block<S: Simd>(
     }
     target.touch(tile);
     let at = tile * 16 + block;
-    let z = (f.depth_steps + origin).max(f.depth_min).min(f.depth_max);
+    let z = (paint.depth_steps + origin)
+        .max(f32x16::splat(simd, paint.depth_min))
+        .min(f32x16::splat(simd, paint.depth_max));
     let old = f32x16::from_slice(simd, &target.depth[at].0);
     let mut write = z.simd_gt(old).to_bitmask() as u32 & covered;
     let tied = z.simd_eq(old).to_bitmask() as u32 & covered;
     if tied != 0 {
         write |=
-            win_ties(target, f.how.id, at, tied, z.simd_gt(f32x16::splat(simd, 0.0)).to_bitmask() as u32);
+            win_ties(target, paint.how.id, at, tied, z.simd_gt(f32x16::splat(simd, 0.0)).to_bitmask() as u32);
     }
-    if f.how.masked {
+    if paint.how.masked {
         let candidates = write;
         for p in (0..16).filter(|p| candidates & (1 << p) != 0) {
             if is_hole(target.left + corner.0 + (p & 3), target.top + corner.1 + (p >> 2)) {
@@ -556,28 +683,28 @@ fn fill_block<S: Simd>(
     if write == 0 {
         return false;
     }
-    f.wrote = true;
+    paint.wrote = true;
     target.counters.pixels_written += u64::from(write.count_ones());
     if write == 0xFFFF {
         z.store_slice(&mut target.depth[at].0);
-        target.block_id[at] = f.slot;
-        if !f.how.hierarchical {
+        target.block_id[at] = paint.slot;
+        if !paint.how.hierarchical {
             return false;
         }
         // Rounding is monotonic, so the least pixel is the one with the least step.
-        let min = (origin + f.least_step).max(f.least_depth).min(f.most_depth);
+        let min = (origin + paint.least_step).max(paint.depth_min).min(paint.depth_max);
         return target.raise_block_minimum(tile, block, min);
     }
     let mask = mask32x16::from_bitmask(simd, u64::from(write));
     let new = mask.select(z, old);
     new.store_slice(&mut target.depth[at].0);
-    let slots = u32x16::splat(simd, f.slot);
+    let slots = u32x16::splat(simd, paint.slot);
     let ids: &mut Sixteen<u32> = &mut target.id[at];
     let shared = std::mem::replace(&mut target.block_id[at], MIXED);
     let old_ids =
         if shared == MIXED { u32x16::from_slice(simd, &ids.0) } else { u32x16::splat(simd, shared) };
     mask.select(slots, old_ids).store_slice(&mut ids.0);
-    if !f.how.hierarchical {
+    if !paint.how.hierarchical {
         return false;
     }
     // As long as one of the farthest pixels stays, so does the minimum.
@@ -586,53 +713,6 @@ fn fill_block<S: Simd>(
         return false;
     }
     target.raise_block_minimum(tile, block, new.reduce_min())
-}
-
-/// Fills a triangle that covers one pixel: the operations of [`fill_block`] on one lane.
-#[inline(always)]
-fn fill_pixel<S: Simd>(
-    simd: S,
-    target: &mut Target,
-    t: &ScreenTriangle,
-    id: SurfaceId,
-    hierarchical: bool,
-) -> bool {
-    let (x, y) = (t.bounds.left - target.left, t.bounds.top - target.top);
-    let tile = (y >> 4) as usize * target.tiles_x + (x >> 4) as usize;
-    let block = ((y >> 2 & 3) * 4 + (x >> 2 & 3)) as usize;
-    if target.visits.is_some() {
-        target.count_polygon_visit((x, y), 1, 1);
-    }
-    let block_min = target.block_minima(tile)[block];
-    if hierarchical && t.depth_max < block_min {
-        return false;
-    }
-    target.touch(tile);
-    let (at, pixel) = (tile * 16 + block, ((y & 3) * 4 + (x & 3)) as usize);
-    let (corner_x, corner_y) = (f64::from(t.bounds.left & !3), f64::from(t.bounds.top & !3));
-    let origin = ((t.plane[0] * corner_x + t.plane[1] * corner_y) + t.plane[2]) as f32;
-    let step = (x & 3) as f32 * t.plane[0] as f32 + (y & 3) as f32 * t.plane[1] as f32;
-    let z = (step + origin).max(t.depth_min).min(t.depth_max);
-    let old = target.depth[at].0[pixel];
-    let wins = z > old || (z == old && z > 0.0 && id < target.surface_in(at, pixel));
-    if !wins {
-        return false;
-    }
-    target.depth[at].0[pixel] = z;
-    let shared = std::mem::replace(&mut target.block_id[at], MIXED);
-    if shared != MIXED {
-        target.id[at] = Sixteen([shared; 16]);
-    }
-    target.id[at].0[pixel] = target.surfaces.len() as u32;
-    target.surfaces.push(id);
-    target.counters.pixels_written += 1;
-    if hierarchical && old == block_min {
-        let min = f32x16::from_slice(simd, &target.depth[at].0).reduce_min();
-        if target.raise_block_minimum(tile, block, min) {
-            target.mark_stale(tile);
-        }
-    }
-    true
 }
 
 /// Of the pixels that hold exactly this depth, those whose surface has a larger id.

@@ -80,8 +80,11 @@ pub(super) struct Lanes {
     pub depth_max: Sixteen<f32>,
     /// Lanes to fill.
     pub draw: u16,
-    /// Lanes whose bounds hold a single pixel, which they cover.
-    pub single: u16,
+    /// Lanes whose unclipped bounds hold at most 2×2 pixels, of which they cover one at least.
+    pub tiny: u16,
+    /// Of those, the lanes that cover the pixel of their bounds at the left and top, right and top, left and
+    /// bottom, right and bottom.
+    pub covers: [u16; 4],
     /// Lanes to clip first.
     pub clip: u16,
     /// Lanes that face the eye (clipped ones not counted).
@@ -106,7 +109,8 @@ impl Default for Lanes {
             depth_min: Sixteen([0.0; 16]),
             depth_max: Sixteen([0.0; 16]),
             draw: 0,
-            single: 0,
+            tiny: 0,
+            covers: [0; 4],
             clip: 0,
             front_facing: 0,
         }
@@ -171,17 +175,19 @@ pub(super) fn set_up<S: Simd>(
 
     let x = to_i32(simd, &low.snapped_x, &high.snapped_x);
     let y = to_i32(simd, &low.snapped_y, &high.snapped_y);
-    let left = first_pixel(&x).max(i32x16::splat(simd, window.left));
-    let top = first_pixel(&y).max(i32x16::splat(simd, window.top));
-    let right = last_pixel(&x).min(i32x16::splat(simd, window.right - 1));
-    let bottom = last_pixel(&y).min(i32x16::splat(simd, window.bottom - 1));
+    let (first_x, last_x, first_y, last_y) = (first_pixel(&x), last_pixel(&x), first_pixel(&y), last_pixel(&y));
+    let left = first_x.max(i32x16::splat(simd, window.left));
+    let top = first_y.max(i32x16::splat(simd, window.top));
+    let right = last_x.min(i32x16::splat(simd, window.right - 1));
+    let bottom = last_y.min(i32x16::splat(simd, window.bottom - 1));
     let holds_a_centre = (left.simd_le(right) & top.simd_le(bottom)).to_bitmask() as u16;
     let draw = facing & holds_a_centre;
+    let tiny = ((last_x - first_x).simd_le(1) & (last_y - first_y).simd_le(1)).to_bitmask() as u16 & draw;
 
     lanes.clip = clip;
     lanes.front_facing = facing;
     lanes.draw = draw;
-    lanes.single = 0;
+    lanes.tiny = 0;
     if draw == 0 {
         return;
     }
@@ -190,10 +196,11 @@ pub(super) fn set_up<S: Simd>(
     let swap = mask32x16::from_bitmask(simd, u64::from(negative));
     let x = [x[0], swap.select(x[2], x[1]), swap.select(x[1], x[2])];
     let y = [y[0], swap.select(y[2], y[1]), swap.select(y[1], y[2])];
-    let single = (left.simd_eq(right) & top.simd_eq(bottom)).to_bitmask() as u16 & draw;
-    if single != 0 {
-        lanes.single = single & covers_pixel(simd, &x, &y, left, top);
-        lanes.draw &= !single | lanes.single;
+    if tiny != 0 {
+        lanes.covers = covered_pixels(simd, &x, &y, first_x, first_y);
+        let [a, b, c, d] = lanes.covers;
+        lanes.draw &= !tiny | (a | b | c | d);
+        lanes.tiny = tiny & lanes.draw;
         if lanes.draw == 0 {
             return;
         }
@@ -290,26 +297,37 @@ fn dot<S: Simd>(simd: S, row: &[f64; 4], p: &[f64x8<S>; 3]) -> f64x8<S> {
     (xy + f64x8::splat(simd, row[2]) * p[2]) + f64x8::splat(simd, row[3])
 }
 
-/// Whether each lane covers pixel (px, py), by the fill rule; for triangles less than two pixels wide and
-/// high (others overflow and mean nothing).
+/// Which lanes cover the centre of pixel (px, py) and of its neighbours to the right, below, and below to the
+/// right, by the fill rule; for triangles whose bounds hold no others (those of larger ones overflow and mean
+/// nothing).
 #[inline(always)]
-fn covers_pixel<S: Simd>(
+fn covered_pixels<S: Simd>(
     simd: S,
     x: &[i32x16<S>; 3],
     y: &[i32x16<S>; 3],
     px: i32x16<S>,
     py: i32x16<S>,
-) -> u16 {
+) -> [u16; 4] {
     let zero = i32x16::splat(simd, 0);
     let (cx, cy) = ((px << 8) + 128, (py << 8) + 128);
-    let mut outside = zero;
+    let mut outside = [zero; 4];
     for k in 0..3 {
         let (dx, dy) = (x[(k + 1) % 3] - x[k], y[(k + 1) % 3] - y[k]);
         let owned = dy.simd_lt(zero) | (dy.simd_eq(zero) & dx.simd_gt(zero));
         let bias = owned.select(zero, i32x16::splat(simd, -1));
-        outside |= dx * (cy - y[k]) - dy * (cx - x[k]) + bias;
+        let here = dx * (cy - y[k]) - dy * (cx - x[k]) + bias;
+        let (right, below) = (here - (dy << 8), dx << 8);
+        outside[0] |= here;
+        outside[1] |= right;
+        outside[2] |= here + below;
+        outside[3] |= right + below;
     }
-    !outside.simd_lt(zero).to_bitmask() as u16
+    [
+        !outside[0].simd_lt(zero).to_bitmask() as u16,
+        !outside[1].simd_lt(zero).to_bitmask() as u16,
+        !outside[2].simd_lt(zero).to_bitmask() as u16,
+        !outside[3].simd_lt(zero).to_bitmask() as u16,
+    ]
 }
 
 /// First pixel whose centre 256·p + 128 is not before a box's smallest coordinate.
