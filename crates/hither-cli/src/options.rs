@@ -4,7 +4,7 @@ use crate::console::Verbosity;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use hither::index::TreeKind;
-use hither::render::{Algorithm, ComplexityPanel, Shading};
+use hither::render::{Algorithm, Coherence, ComplexityPanel, Shading};
 use hither::{IndexOptions, RenderOptions};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -86,7 +86,7 @@ pub struct WorkOptions {
     /// Which tree the scene is sorted into
     #[arg(long, value_name = "NAME", default_value = "bvh", help_heading = "Work")]
     pub tree: TreeName,
-    /// Start each picture from what was visible in the last
+    /// Start each picture from what was visible in the last, where that saves work
     #[arg(long, help_heading = "Work")]
     pub coherence: bool,
 }
@@ -101,7 +101,7 @@ impl WorkOptions {
         RenderOptions {
             algorithm,
             threads: usize::from(self.threads),
-            coherence: self.coherence,
+            coherence: if self.coherence { Coherence::WherePays } else { Coherence::Never },
             complexity,
             ..RenderOptions::default()
         }

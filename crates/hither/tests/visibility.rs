@@ -6,6 +6,7 @@ use fearless_simd::Level;
 use glam::{DQuat, DVec3};
 use hither::conventions::View;
 use hither::reference::{Caster, Judgement, trouble, zbuffer};
+use hither::render::Coherence;
 use hither::scene::{Content, Transform};
 use hither::{Algorithm, Frame, IndexOptions, RenderOptions, Renderer, Scene, SceneIndex, render};
 use proptest::prelude::*;
@@ -118,7 +119,8 @@ fn moving_instances_and_reused_buffers_change_nothing() {
         let (scene, view) = (trouble::scene(seed), trouble::view(seed));
         let nodes = scene.root_group().nodes.len() as u32;
         let mut index = index_of(scene);
-        let mut renderers = [false, true].map(|coherence| (Renderer::new(), coherence));
+        let mut renderers =
+            [Coherence::Never, Coherence::WherePays, Coherence::Always].map(|c| (Renderer::new(), c));
         for step in 0..6 {
             let t = f64::from(step);
             let moved = step % nodes;
@@ -137,7 +139,7 @@ fn moving_instances_and_reused_buffers_change_nothing() {
                 let options = RenderOptions { coherence: *coherence, ..RenderOptions::default() };
                 let frame = renderer.render(&index, &view, &options).unwrap();
                 if let Some(at) = difference(&truth, &frame) {
-                    panic!("seed {seed}, step {step}, coherence {coherence}: {at}");
+                    panic!("seed {seed}, step {step}, {coherence:?}: {at}");
                 }
                 renderer.recycle(frame);
             }
@@ -156,7 +158,7 @@ fn coherence_changes_nothing_while_the_eye_moves() {
             view.view_from_world.translation += DVec3::new(0.2, -0.1, 0.3) * step as f64;
             let truth = render(&index, &view, &plain(Level::new())).unwrap();
             let options = RenderOptions {
-                coherence: true,
+                coherence: Coherence::Always,
                 threads: 1 + step % 3,
                 window_width: 16 * (step as u32 % 2),
                 ..RenderOptions::default()

@@ -608,7 +608,8 @@ fn fill_tile<S: Simd>(
     let whole = !(partial.simd_lt(zero).to_bitmask() as u32);
     let origins = f.paint.plane_at_blocks(simd, target, x, y);
     if f.paint.how.hierarchical {
-        let bounds = (origins + f.paint.plane_margins(simd, origins) + f.block_rise).min(f32x16::splat(simd, depth_max));
+        let bounds = (origins + f.paint.plane_margins(simd, origins) + f.block_rise)
+            .min(f32x16::splat(simd, depth_max));
         let minima = f32x16::from_slice(simd, target.block_minima(tile));
         blocks &= bounds.simd_ge(minima).to_bitmask() as u32;
         if target.visits.is_some() {

@@ -175,7 +175,8 @@ pub(super) fn set_up<S: Simd>(
 
     let x = to_i32(simd, &low.snapped_x, &high.snapped_x);
     let y = to_i32(simd, &low.snapped_y, &high.snapped_y);
-    let (first_x, last_x, first_y, last_y) = (first_pixel(&x), last_pixel(&x), first_pixel(&y), last_pixel(&y));
+    let (first_x, last_x, first_y, last_y) =
+        (first_pixel(&x), last_pixel(&x), first_pixel(&y), last_pixel(&y));
     let left = first_x.max(i32x16::splat(simd, window.left));
     let top = first_y.max(i32x16::splat(simd, window.top));
     let right = last_x.min(i32x16::splat(simd, window.right - 1));

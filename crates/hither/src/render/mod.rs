@@ -1,12 +1,14 @@
 //! Pictures of what is visible: ids and depth by the hierarchical z-buffer, shading afterwards.
 
 mod blend;
+mod coherence;
 mod frame;
 mod queue;
 mod shade;
 mod walk;
 
 pub use blend::{BlendedTriangles, Fragment};
+pub use coherence::Coherence;
 pub use frame::{Complexity, Counters, Frame};
 pub use shade::{
     COMPLEXITY_WHITE, ComplexityPanel, Image, Shader, Shading, complexity_image, complexity_panels, shade,
@@ -35,7 +37,7 @@ pub struct RenderOptions {
     /// Worker threads; 0 means one for each core.
     pub threads: usize,
     /// Start from what was visible in this renderer's last frame [Greene 1995, §3.3.3].
-    pub coherence: bool,
+    pub coherence: Coherence,
     /// Also record where the work was done ([`Complexity`]); slower.
     pub complexity: bool,
     /// Width of the windows the image is cut into, pixels, a multiple of 16; 0 chooses it from `threads`.
@@ -49,7 +51,7 @@ impl Default for RenderOptions {
         RenderOptions {
             algorithm: Algorithm::Hzb,
             threads: 1,
-            coherence: false,
+            coherence: Coherence::Never,
             complexity: false,
             window_width: 0,
             level: Level::new(),
@@ -92,8 +94,8 @@ impl Renderer {
         let draw = |(window, memory): Work| {
             walk::draw_window(options.level, index, view, options.algorithm, window, memory)
         };
-        let coherent = options.coherence && options.algorithm == Algorithm::Hzb;
-        self.prepare_memories(coherent, index, &columns);
+        let plain = options.algorithm == Algorithm::ZBuffer;
+        self.prepare_memories(if plain { Coherence::Never } else { options.coherence }, index, &columns);
         let memories = self.memories.iter_mut().map(Some).chain(std::iter::repeat_with(|| None));
         let work = windows.iter_mut().zip(memories);
         let counts: Vec<Counters> =
@@ -114,9 +116,9 @@ impl Renderer {
         self.spare = frame.windows;
     }
 
-    /// One memory a window if the frame is to be coherent, none otherwise.
-    fn prepare_memories(&mut self, coherent: bool, index: &SceneIndex, columns: &[u32]) {
-        if !coherent {
+    /// One memory a window if the frame may be coherent, none otherwise.
+    fn prepare_memories(&mut self, coherence: Coherence, index: &SceneIndex, columns: &[u32]) {
+        if coherence == Coherence::Never {
             self.memories.clear();
             return;
         }
@@ -127,6 +129,9 @@ impl Renderer {
             self.memories.clear();
             self.memories.resize_with(columns.len(), walk::Memory::default);
             self.remembered = (index.serial, columns.to_vec());
+        }
+        for memory in &mut self.memories {
+            memory.always = coherence == Coherence::Always;
         }
     }
 

@@ -12,12 +12,13 @@
 //! The order only saves work: whatever it is, the window ends up the same (see `raster`). Entries are
 //! tested when they are taken, not when they are pushed, so that what was drawn meanwhile counts.
 //!
-//! With a [`Memory`], the blocks that showed in the last frame are drawn first and the walk only fills in
-//! what has come into view. A block is remembered as long as the walk finds it in an open leaf.
+//! With a [`Memory`], the blocks that showed in the last frame are drawn first, where that pays, and the walk
+//! only fills in what has come into view. A block is remembered as long as the walk finds it in an open leaf.
 //!
 //! The plain z-buffer is the same walk with every test against the pyramid left out: it visits all that
 //! lies in the frustum and draws all of it.
 
+use super::coherence::Choice;
 use super::queue::NearestFirst;
 use super::{Algorithm, Counters};
 use crate::conventions::View;
@@ -114,8 +115,10 @@ fn walk<S: Simd>(
     };
     let root = index.scene().root;
     if let Some(memory) = &memory {
-        walk.draw_remembered(simd, target, memory, ScreenFromObject::of_view(view));
-        walk.seen = Some(Vec::with_capacity(memory.seen.len() + 64));
+        if memory.starts_next() {
+            walk.draw_remembered(simd, target, memory, ScreenFromObject::of_view(view));
+        }
+        walk.seen = memory.keeps_next().then(|| Vec::with_capacity(memory.seen.len() + 64));
     }
     walk.enter(simd, target, Content::Group(root), ScreenFromObject::of_view(view), 0);
     while let Some(entry) = walk.open.pop() {
@@ -129,8 +132,9 @@ fn walk<S: Simd>(
         }
     }
     walk.counters.pixels_written = target.counters.pixels_written;
-    if let (Some(memory), Some(seen)) = (memory, walk.seen.take()) {
-        memory.seen = seen;
+    if let Some(memory) = memory {
+        memory.seen = walk.seen.take().unwrap_or_default();
+        memory.choice.learn(&walk.counters);
     }
     walk.counters
 }
@@ -260,8 +264,10 @@ impl<'a> Walk<'a> {
             }
             Space::Mesh { blocks, mesh } => {
                 let this = Block { instance: c.instance, block: leaf };
-                if self.drawn.contains(&this) {
-                    self.seen.get_or_insert_default().push(this);
+                if !self.drawn.is_empty() && self.drawn.contains(&this) {
+                    if let Some(seen) = &mut self.seen {
+                        seen.push(this);
+                    }
                     return;
                 }
                 let block = &blocks.blocks[leaf as usize];
@@ -358,6 +364,19 @@ fn screen_from_instance(
 #[derive(Debug, Default)]
 pub(super) struct Memory {
     seen: Vec<Block>,
+    /// Whether every frame is to start from the last one, wherever the choice would fall.
+    pub always: bool,
+    choice: Choice,
+}
+
+impl Memory {
+    fn starts_next(&self) -> bool {
+        self.always || self.choice.next_is_coherent()
+    }
+
+    fn keeps_next(&self) -> bool {
+        self.always || self.choice.remembers()
+    }
 }
 
 /// A block of triangles of one instance.
