@@ -213,3 +213,27 @@ fn shared_edges_are_drawn_exactly_once() {
         }
     }
 }
+
+/// Edge functions of a large triangle do not fit into 32 bits, however few pixels of it are in the picture.
+#[test]
+fn a_large_triangle_is_right_in_a_picture_of_a_pixel_or_two() {
+    use hither::scene::{Mesh, Node, Primitive};
+    let mut random = trouble::Random::new(77);
+    for case in 0..3000 {
+        let mut mesh = Mesh::default();
+        for _ in 0..3 {
+            let mut far = || random.between(-8000.0, 8000.0) as f32;
+            mesh.positions.push(glam::Vec3::new(far(), far(), -1.0));
+        }
+        mesh.triangles = vec![[0, 1, 2], [0, 2, 1]];
+        mesh.primitives = vec![Primitive { triangles: 0..2, material: None }];
+        let mut scene = Scene::new("large");
+        scene.meshes.push(mesh);
+        scene.groups[0].push(Node { content: Content::Mesh(0), ..Node::default() });
+        let size = [(1, 1), (2, 1), (1, 2), (2, 2)][case % 4];
+        let half_height = f64::from(size.1) * 0.5;
+        let projection = hither::conventions::Projection::Orthographic { half_height, near: 0.0, far: 2.0 };
+        let view = View::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, size);
+        check_everything(scene, &view).unwrap_or_else(|why| panic!("case {case}: {why}"));
+    }
+}
