@@ -4,7 +4,7 @@ use crate::console::Verbosity;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use hither::index::TreeKind;
-use hither::render::{Algorithm, Coherence, ComplexityPanel, Shading};
+use hither::render::{Algorithm, BoxTest, Coherence, ComplexityPanel, Shading};
 use hither::{IndexOptions, RenderOptions};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -83,6 +83,9 @@ pub struct WorkOptions {
     /// How visibility is found
     #[arg(long, value_name = "NAME", default_value = "hzb", help_heading = "Work")]
     pub algorithm: AlgorithmName,
+    /// What the hierarchical z-buffer asks of boxes
+    #[arg(long, value_name = "NAME", default_value = "rectangle", help_heading = "Work")]
+    pub box_test: BoxTestName,
     /// Which tree the scene is sorted into
     #[arg(long, value_name = "NAME", default_value = "bvh", help_heading = "Work")]
     pub tree: TreeName,
@@ -100,6 +103,10 @@ impl WorkOptions {
         };
         RenderOptions {
             algorithm,
+            box_test: match self.box_test {
+                BoxTestName::Rectangle => BoxTest::Rectangle,
+                BoxTestName::Definitive => BoxTest::Definitive,
+            },
             threads: usize::from(self.threads),
             coherence: if self.coherence { Coherence::WherePays } else { Coherence::Never },
             complexity,
@@ -125,6 +132,15 @@ pub enum AlgorithmName {
     Hzb,
     /// Plain z-buffer: every triangle in the view
     Zbuffer,
+}
+
+/// `--box-test`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum BoxTestName {
+    /// Whether the rectangle around them is hidden
+    Rectangle,
+    /// And whether their outline is
+    Definitive,
 }
 
 /// `--tree`.

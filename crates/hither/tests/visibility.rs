@@ -6,7 +6,7 @@ use fearless_simd::Level;
 use glam::{DQuat, DVec3};
 use hither::conventions::View;
 use hither::reference::{Caster, Judgement, trouble, zbuffer};
-use hither::render::Coherence;
+use hither::render::{BoxTest, Coherence};
 use hither::scene::{Content, Transform};
 use hither::{Algorithm, Frame, IndexOptions, RenderOptions, Renderer, Scene, SceneIndex, render};
 use proptest::prelude::*;
@@ -56,6 +56,7 @@ fn check_everything(scene: Scene, view: &View) -> Result<(), String> {
             RenderOptions { window_width: 16, ..hzb },
             RenderOptions { window_width: 32, threads: 3, ..hzb },
             RenderOptions { complexity: true, ..hzb },
+            RenderOptions { box_test: BoxTest::Definitive, ..hzb },
         ];
         for options in variants {
             let frame = render(&index, view, &options).map_err(|e| e.to_string())?;

@@ -1,5 +1,6 @@
 //! The tables, one file each.
 
+mod box_tests;
 mod coherence;
 mod exact;
 mod greene;
@@ -45,6 +46,7 @@ pub static TABLES: &[TableInfo] = &[
     scaling::THREADS,
     scaling::WINDOWS,
     coherence::INFO,
+    box_tests::INFO,
     trees::INFO,
     load::INFO,
 ];

@@ -176,6 +176,7 @@ impl Job<'_> {
             "height": arguments.view.size.1,
             "camera": camera,
             "algorithm": options::word(arguments.work.algorithm),
+            "box_test": options::word(arguments.work.box_test),
             "tree": options::word(arguments.work.tree),
             "shade": options::word(arguments.shade),
             "threads": arguments.work.threads,

@@ -23,6 +23,7 @@
 
 mod boxes;
 mod clip;
+mod definitive;
 mod fill;
 mod pyramid;
 mod setup;

@@ -8,7 +8,9 @@
 //! pixels. Pixels beyond the image's right and bottom border hold +∞: nothing is drawn there, and they
 //! never hold a minimum down.
 
+use super::definitive::Outline;
 use super::setup::Lanes;
+use super::transform::ScreenFromObject;
 use crate::conventions::SurfaceId;
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
@@ -251,6 +253,81 @@ impl Target {
         samples.min[(y >> 2) * samples.columns + (x >> 2)].0[(y & 3) * 4 + (x & 3)] > depth
     }
 
+    /// Whether nothing at or behind `depth` could be seen anywhere in the outline of the box from `min` to
+    /// `max`, of whose rectangle `rect` [`Target::hides`] said no: the definitive test (see `definitive`).
+    #[inline(always)]
+    pub(crate) fn hides_outline<S: Simd>(
+        &mut self,
+        simd: S,
+        at: &ScreenFromObject,
+        bounds: [[f32; 3]; 2],
+        rect: Rect,
+        depth: f32,
+    ) -> bool {
+        let window = Rect {
+            left: self.left,
+            top: self.top,
+            right: self.left + self.width,
+            bottom: self.top + self.height,
+        };
+        let Some(outline) = Outline::new(at, bounds[0], bounds[1], window) else { return false };
+        let rect = [rect.left, rect.top, rect.right - 1, rect.bottom - 1];
+        let top = self.levels.len() - 1;
+        // Depth first, as `shows_in`, with the polygon's sides as a further sieve.
+        let mut stack = [(0u32, 0u32, 0u32); MAX_LEVELS + 1];
+        let mut level = top;
+        let (mut px, mut py) = (0u32, 0u32);
+        let mut bits = self.open_in_outline(simd, level, px, py, rect, depth, &outline);
+        loop {
+            if bits == 0 {
+                if level == top {
+                    return true;
+                }
+                level += 1;
+                (px, py, bits) = stack[level];
+                continue;
+            }
+            let c = bits.trailing_zeros();
+            bits &= bits - 1;
+            let (cx, cy) = (px * 4 + c % 4, py * 4 + c / 4);
+            if level > 0 {
+                let inner = self.open_in_outline(simd, level - 1, cx, cy, rect, depth, &outline);
+                if inner != 0 {
+                    stack[level] = (px, py, bits);
+                    level -= 1;
+                    (px, py, bits) = (cx, cy, inner);
+                }
+                continue;
+            }
+            let tile = py as usize * self.levels[0].columns + px as usize;
+            let pixels = self.pixels_at_or_behind(simd, tile, c as usize, cx as i32, cy as i32, rect, depth);
+            if pixels & outline.cells(simd, (cx * 4) as f32, (cy * 4) as f32, 1) != 0 {
+                return false;
+            }
+        }
+    }
+
+    /// The children of a parent that meet `rect` and the outline, and hold `depth` or something farther.
+    #[expect(clippy::too_many_arguments, reason = "the inner step of one search, split off to be read")]
+    #[inline(always)]
+    fn open_in_outline<S: Simd>(
+        &mut self,
+        simd: S,
+        level: usize,
+        px: u32,
+        py: u32,
+        rect: [i32; 4],
+        depth: f32,
+        outline: &Outline,
+    ) -> u32 {
+        let bits = self.children_at_or_behind(simd, level, px, py, rect, depth);
+        if bits == 0 {
+            return 0;
+        }
+        let side = 4i32 << (2 * level);
+        bits & outline.cells(simd, (px as i32 * side * 4) as f32, (py as i32 * side * 4) as f32, side)
+    }
+
     /// Whether some pixel of `[left, top, right, bottom]` (inclusive) inside this tile holds `depth` or
     /// something farther.
     #[inline(always)]
@@ -271,7 +348,7 @@ impl Target {
             let c = bits.trailing_zeros() as i32;
             bits &= bits - 1;
             let (bx, by) = (tile_x * 4 + (c & 3), tile_y * 4 + (c >> 2));
-            if self.block_shows(simd, tile, c as usize, bx, by, rect, depth) {
+            if self.pixels_at_or_behind(simd, tile, c as usize, bx, by, rect, depth) != 0 {
                 return true;
             }
         }
@@ -312,7 +389,7 @@ impl Target {
             let (cx, cy) = (px * 4 + c % 4, py * 4 + c / 4);
             if level == 0 {
                 let tile = py as usize * self.levels[0].columns + px as usize;
-                if self.block_shows(simd, tile, c as usize, cx as i32, cy as i32, rect, depth) {
+                if self.pixels_at_or_behind(simd, tile, c as usize, cx as i32, cy as i32, rect, depth) != 0 {
                     return true;
                 }
                 continue;
@@ -329,10 +406,9 @@ impl Target {
         }
     }
 
-    /// Which of a parent's children meet `rect` and hold `depth` or something farther; or that one of them
-    /// lies wholly inside, whose minimum is a pixel of the rectangle.
+    /// Which of a parent's children meet `rect` and hold `depth` or something farther.
     #[inline(always)]
-    fn open_children<S: Simd>(
+    fn children_at_or_behind<S: Simd>(
         &mut self,
         simd: S,
         level: usize,
@@ -340,7 +416,7 @@ impl Target {
         py: u32,
         rect: [i32; 4],
         depth: f32,
-    ) -> Children {
+    ) -> u32 {
         let parent = py as usize * self.levels[level].columns + px as usize;
         if level > 0 && self.levels[level].stale[parent] != 0 {
             self.refresh(simd, level, parent);
@@ -357,10 +433,26 @@ impl Target {
             self.count_cube_visit(level, parent, meets);
         }
         let values = f32x16::from_slice(simd, &self.levels[level].min[parent].0);
-        let bits = values.simd_le(f32x16::splat(simd, depth)).to_bitmask() as u32 & meets;
+        values.simd_le(f32x16::splat(simd, depth)).to_bitmask() as u32 & meets
+    }
+
+    /// The same; or that one of them lies wholly inside `rect`, whose minimum is then a pixel of it.
+    #[inline(always)]
+    fn open_children<S: Simd>(
+        &mut self,
+        simd: S,
+        level: usize,
+        px: u32,
+        py: u32,
+        rect: [i32; 4],
+        depth: f32,
+    ) -> Children {
+        let bits = self.children_at_or_behind(simd, level, px, py, rect, depth);
         if bits == 0 {
             return Children::Open(0);
         }
+        let shift = 2 * (level as u32 + 1);
+        let (base_x, base_y) = ((px as i32) << 2, (py as i32) << 2);
         let up = (1i32 << shift) - 1;
         let whole = cell_mask(
             (((rect[0] + up) >> shift) - base_x).max(0),
@@ -371,9 +463,10 @@ impl Target {
         if bits & whole != 0 { Children::Shown } else { Children::Open(bits) }
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the last step of one search, split off to be read")]
+    /// Which of a block's pixels lie in `rect` and hold `depth` or something farther.
+    #[expect(clippy::too_many_arguments, reason = "the last step of two searches")]
     #[inline(always)]
-    fn block_shows<S: Simd>(
+    fn pixels_at_or_behind<S: Simd>(
         &mut self,
         simd: S,
         tile: usize,
@@ -382,20 +475,20 @@ impl Target {
         by: i32,
         rect: [i32; 4],
         depth: f32,
-    ) -> bool {
-        if !self.touched[tile] {
-            return true;
-        }
+    ) -> u32 {
         let x0 = (rect[0] - bx * 4).max(0);
         let y0 = (rect[1] - by * 4).max(0);
         let x1 = (rect[2] - bx * 4).min(3);
         let y1 = (rect[3] - by * 4).min(3);
-        let values = f32x16::from_slice(simd, &self.depth[tile * 16 + block].0);
         let mask = cell_mask(x0, y0, x1, y1);
+        if !self.touched[tile] {
+            return mask;
+        }
+        let values = f32x16::from_slice(simd, &self.depth[tile * 16 + block].0);
         if let Some(visits) = &mut self.visits {
             add_visits(&mut visits.cubes, self.width, self.height, (bx * 4, by * 4), 1, mask);
         }
-        values.simd_le(f32x16::splat(simd, depth)).to_bitmask() as u32 & mask != 0
+        values.simd_le(f32x16::splat(simd, depth)).to_bitmask() as u32 & mask
     }
 
     /// Brings the minima of `parent`'s stale children up to date.

@@ -29,11 +29,24 @@ pub enum Algorithm {
     ZBuffer,
 }
 
+/// What the hierarchical z-buffer asks of a box before it opens it. The pictures are the same to the last bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BoxTest {
+    /// Whether its rectangle on the screen is hidden at its nearest depth: "fast" [Greene 1995, §3.3.2].
+    #[default]
+    Rectangle,
+    /// Of what that leaves, also whether its outline is: "definitive". It opens 1 to 2 % fewer boxes and, with
+    /// sixteen of them tested at a time before, costs more than it saves.
+    Definitive,
+}
+
 /// What may be chosen about a rendering.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderOptions {
     /// How visibility is found.
     pub algorithm: Algorithm,
+    /// What is asked of a box.
+    pub box_test: BoxTest,
     /// Worker threads; 0 means one for each core.
     pub threads: usize,
     /// Start from what was visible in this renderer's last frame [Greene 1995, §3.3.3].
@@ -50,6 +63,7 @@ impl Default for RenderOptions {
     fn default() -> Self {
         RenderOptions {
             algorithm: Algorithm::Hzb,
+            box_test: BoxTest::Rectangle,
             threads: 1,
             coherence: Coherence::Never,
             complexity: false,
@@ -92,7 +106,14 @@ impl Renderer {
             window.record_visits(options.complexity);
         }
         let draw = |(window, memory): Work| {
-            walk::draw_window(options.level, index, view, options.algorithm, window, memory)
+            walk::draw_window(
+                options.level,
+                index,
+                view,
+                (options.algorithm, options.box_test),
+                window,
+                memory,
+            )
         };
         let plain = options.algorithm == Algorithm::ZBuffer;
         self.prepare_memories(if plain { Coherence::Never } else { options.coherence }, index, &columns);

@@ -3,7 +3,8 @@
 //! ```text
 //! push the root
 //! while something is open:
-//!     take the nearest open entry; if the z-pyramid hides its rectangle at its nearest depth: drop it
+//!     take the nearest open entry; if the z-pyramid hides its rectangle (or its outline, where that is asked
+//!     for) at its nearest depth: drop it
 //!     a block of triangles: draw it
 //!     an instance: enter its tree, with its transform composed in f64
 //!     a node: project its sixteen boxes; open those that may hold a pixel centre
@@ -20,7 +21,7 @@
 
 use super::coherence::Choice;
 use super::queue::NearestFirst;
-use super::{Algorithm, Counters};
+use super::{Algorithm, BoxTest, Counters};
 use crate::conventions::View;
 use crate::index::{BlockTree, Box3, Child, GroupIndex, SceneIndex, Slot, WideTree};
 use crate::raster::{
@@ -37,11 +38,11 @@ pub(super) fn draw_window(
     level: Level,
     index: &SceneIndex,
     view: &View,
-    algorithm: Algorithm,
+    how: (Algorithm, BoxTest),
     target: &mut Target,
     memory: Option<&mut Memory>,
 ) -> Counters {
-    dispatch!(level, simd => walk(simd, index, view, algorithm, target, memory))
+    dispatch!(level, simd => walk(simd, index, view, how, target, memory))
 }
 
 /// A tree entered with a transform.
@@ -66,6 +67,8 @@ struct Entry {
     /// Index of its context, and whether the slot belongs to a group's tree of moving items.
     context: u32,
     moving: bool,
+    /// The node and the lane that it is the child of.
+    parent: (u32, u8),
     rect: [u16; 4],
     depth: f32,
 }
@@ -79,6 +82,7 @@ struct Walk<'a> {
     open: NearestFirst<Entry>,
     window: Rect,
     hierarchical: bool,
+    definitive: bool,
     /// Blocks drawn from memory before the walk.
     drawn: HashSet<Block, BuildHasherDefault<BlockHasher>>,
     /// Blocks that show, if they are to be remembered.
@@ -91,7 +95,7 @@ fn walk<S: Simd>(
     simd: S,
     index: &SceneIndex,
     view: &View,
-    algorithm: Algorithm,
+    how: (Algorithm, BoxTest),
     target: &mut Target,
     memory: Option<&mut Memory>,
 ) -> Counters {
@@ -108,7 +112,8 @@ fn walk<S: Simd>(
         group_bounds: vec![None; index.groups.len()],
         open: NearestFirst::new(),
         window,
-        hierarchical: algorithm == Algorithm::Hzb,
+        hierarchical: how.0 == Algorithm::Hzb,
+        definitive: how == (Algorithm::Hzb, BoxTest::Definitive),
         drawn: HashSet::default(),
         seen: None,
         counters: Counters::default(),
@@ -126,6 +131,10 @@ fn walk<S: Simd>(
             walk.counters.nodes_culled += 1;
             continue;
         }
+        if walk.definitive && walk.outline_is_hidden(simd, target, &entry) {
+            walk.counters.nodes_culled += 1;
+            continue;
+        }
         match entry.slot.child() {
             Child::Node(node) => walk.visit_node(simd, target, entry.context, entry.moving, node),
             Child::Leaf(leaf) => walk.visit_leaf(simd, target, entry.context, leaf),
@@ -137,6 +146,18 @@ fn walk<S: Simd>(
         memory.choice.learn(&walk.counters);
     }
     walk.counters
+}
+
+/// Rectangles with a side below this, pixels, are left at the test of the rectangle.
+const DEFINITIVE: u16 = 16;
+
+#[inline(always)]
+fn tree_of<'a>(context: &Context<'a>, moving: bool) -> &'a WideTree {
+    match context.space {
+        Space::Mesh { blocks, .. } => &blocks.tree,
+        Space::Group(group) if moving => &group.moving,
+        Space::Group(group) => &group.resting,
+    }
 }
 
 #[inline(always)]
@@ -194,15 +215,24 @@ impl<'a> Walk<'a> {
         }
     }
 
+    /// The definitive test of what the rectangle test did not hide.
+    #[inline(always)]
+    fn outline_is_hidden<S: Simd>(&self, simd: S, target: &mut Target, entry: &Entry) -> bool {
+        let r = &entry.rect;
+        if (r[2] - r[0]).min(r[3] - r[1]) < DEFINITIVE || entry.depth == f32::INFINITY {
+            return false;
+        }
+        let c = &self.contexts[entry.context as usize];
+        let node = &tree_of(c, entry.moving).nodes[entry.parent.0 as usize];
+        let bounds = node.bounds_of(entry.parent.1 as usize);
+        target.hides_outline(simd, &c.at, [bounds.min, bounds.max], rect_of(entry), entry.depth)
+    }
+
     #[inline(always)]
     fn visit_node<S: Simd>(&mut self, simd: S, target: &Target, context: u32, moving: bool, node: u32) {
         let c = &self.contexts[context as usize];
-        let tree: &WideTree = match c.space {
-            Space::Mesh { blocks, .. } => &blocks.tree,
-            Space::Group(group) if moving => &group.moving,
-            Space::Group(group) => &group.resting,
-        };
-        let node = &tree.nodes[node as usize];
+        let number = node;
+        let node = &tree_of(c, moving).nodes[number as usize];
         let window = self.window;
         let boxes = &c.boxes;
         let projected = simd.vectorize(
@@ -212,7 +242,7 @@ impl<'a> Walk<'a> {
         let alive = projected.alive & (0xFFFFu32 >> (16 - node.used)) as u16;
         self.counters.nodes_visited += u64::from(node.used);
         self.counters.nodes_outside += u64::from(node.used - alive.count_ones());
-        self.push_children(target, &projected, alive, &node.child, context, moving);
+        self.push_children(target, &projected, alive, (number, &node.child), context, moving);
     }
 
     /// Opens the children in `alive`.
@@ -222,7 +252,7 @@ impl<'a> Walk<'a> {
         target: &Target,
         projected: &ProjectedBoxes,
         alive: u16,
-        child: &[Slot; 16],
+        (node, child): (u32, &[Slot; 16]),
         context: u32,
         moving: bool,
     ) {
@@ -237,6 +267,7 @@ impl<'a> Walk<'a> {
                 slot: child[lane],
                 context,
                 moving,
+                parent: (node, lane as u8),
                 rect: [
                     projected.left[lane] as u16,
                     projected.top[lane] as u16,
