@@ -23,7 +23,7 @@ impl Slot {
     pub const EMPTY: Slot = Slot(u32::MAX);
 
     pub fn node(index: usize) -> Slot {
-        assert!(index < Slot::LEAF as usize, "a tree has fewer than 2^31 nodes");
+        assert!(index < 1 << 27, "a tree has fewer than 2^27 nodes");
         Slot(index as u32)
     }
 

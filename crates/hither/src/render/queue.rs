@@ -1,6 +1,6 @@
 //! A nearest-first queue in constant time: entries in buckets of about equal depth.
 //!
-//! A bucket spans a 1/32 of an octave of depth (2 %); within one, the last in is the first out. What is
+//! A bucket spans 1/512 of an octave of depth (0.14 %); within one, the last in is the first out. What is
 //! pushed while a walk goes on is never nearer than what it came from, so the front only moves away and
 //! finding the next bucket costs one pass over the buckets a frame. Depth order across the whole scene,
 //! not only within one tree, is what lets long, nested boxes be taken piece by piece.
@@ -21,7 +21,7 @@ const NONE: u32 = u32::MAX;
 /// Depth's float bits without the sign, coarser than this many mantissa bits are ignored.
 const FINE: u32 = 9;
 const SHIFT: u32 = 23 - FINE;
-/// Depths at or below 2⁻⁶⁴ share the last bucket; those above 1 the first.
+/// Depths at or below 2⁻²⁴ share the last bucket; those above 1 the first.
 const OCTAVES: u32 = 24;
 const BUCKETS: usize = (OCTAVES << FINE) as usize + 2;
 

@@ -64,13 +64,40 @@ enum Space<'a> {
 #[derive(Clone, Copy)]
 struct Entry {
     slot: Slot,
-    /// Index of its context, and whether the slot belongs to a group's tree of moving items.
+    /// Index of its context.
     context: u32,
-    moving: bool,
-    /// The node and the lane that it is the child of.
-    parent: (u32, u8),
+    place: Place,
     rect: [u16; 4],
     depth: f32,
+}
+
+/// Where an entry comes from: a node and a lane of its context's tree, or of its tree of moving items.
+/// In 32 bits, for the queue holds hundreds of thousands.
+#[derive(Clone, Copy)]
+struct Place(u32);
+
+impl Place {
+    const MOVING: u32 = 1 << 31;
+
+    #[inline(always)]
+    fn new(moving: bool, node: u32) -> Place {
+        Place(node << 4 | if moving { Place::MOVING } else { 0 })
+    }
+
+    #[inline(always)]
+    fn lane(self, lane: usize) -> Place {
+        Place(self.0 | lane as u32)
+    }
+
+    #[inline(always)]
+    fn is_moving(self) -> bool {
+        self.0 & Place::MOVING != 0
+    }
+
+    #[inline(always)]
+    fn node(self) -> usize {
+        ((self.0 & !Place::MOVING) >> 4) as usize
+    }
 }
 
 struct Walk<'a> {
@@ -136,7 +163,9 @@ fn walk<S: Simd>(
             continue;
         }
         match entry.slot.child() {
-            Child::Node(node) => walk.visit_node(simd, target, entry.context, entry.moving, node),
+            Child::Node(node) => {
+                walk.visit_node(simd, target, entry.context, Place::new(entry.place.is_moving(), node));
+            }
             Child::Leaf(leaf) => walk.visit_leaf(simd, target, entry.context, leaf),
         }
     }
@@ -204,11 +233,11 @@ impl<'a> Walk<'a> {
         let context = self.contexts.len() as u32;
         self.contexts.push(Context { space, at, boxes: BoxSet::new(&at, reach), instance });
         match space {
-            Space::Mesh { .. } => self.visit_node(simd, target, context, false, 0),
+            Space::Mesh { .. } => self.visit_node(simd, target, context, Place::new(false, 0)),
             Space::Group(group) => {
                 for (tree, moving) in [(&group.resting, false), (&group.moving, true)] {
                     if !tree.nodes.is_empty() {
-                        self.visit_node(simd, target, context, moving, 0);
+                        self.visit_node(simd, target, context, Place::new(moving, 0));
                     }
                 }
             }
@@ -223,16 +252,15 @@ impl<'a> Walk<'a> {
             return false;
         }
         let c = &self.contexts[entry.context as usize];
-        let node = &tree_of(c, entry.moving).nodes[entry.parent.0 as usize];
-        let bounds = node.bounds_of(entry.parent.1 as usize);
+        let node = &tree_of(c, entry.place.is_moving()).nodes[entry.place.node()];
+        let bounds = node.bounds_of(entry.place.0 as usize % 16);
         target.hides_outline(simd, &c.at, [bounds.min, bounds.max], rect_of(entry), entry.depth)
     }
 
     #[inline(always)]
-    fn visit_node<S: Simd>(&mut self, simd: S, target: &Target, context: u32, moving: bool, node: u32) {
+    fn visit_node<S: Simd>(&mut self, simd: S, target: &Target, context: u32, place: Place) {
         let c = &self.contexts[context as usize];
-        let number = node;
-        let node = &tree_of(c, moving).nodes[number as usize];
+        let node = &tree_of(c, place.is_moving()).nodes[place.node()];
         let window = self.window;
         let boxes = &c.boxes;
         let projected = simd.vectorize(
@@ -242,7 +270,7 @@ impl<'a> Walk<'a> {
         let alive = projected.alive & (0xFFFFu32 >> (16 - node.used)) as u16;
         self.counters.nodes_visited += u64::from(node.used);
         self.counters.nodes_outside += u64::from(node.used - alive.count_ones());
-        self.push_children(target, &projected, alive, (number, &node.child), context, moving);
+        self.push_children(target, &projected, alive, (place, &node.child), context);
     }
 
     /// Opens the children in `alive`.
@@ -252,9 +280,8 @@ impl<'a> Walk<'a> {
         target: &Target,
         projected: &ProjectedBoxes,
         alive: u16,
-        (node, child): (u32, &[Slot; 16]),
+        (place, child): (Place, &[Slot; 16]),
         context: u32,
-        moving: bool,
     ) {
         let mut rest = alive;
         while rest != 0 {
@@ -266,8 +293,7 @@ impl<'a> Walk<'a> {
             let entry = Entry {
                 slot: child[lane],
                 context,
-                moving,
-                parent: (node, lane as u8),
+                place: place.lane(lane),
                 rect: [
                     projected.left[lane] as u16,
                     projected.top[lane] as u16,
