@@ -596,13 +596,13 @@ fn fill_tile<S: Simd>(
     let zero = i32x16::splat(simd, 0);
     let (mut outside, mut partial) = (zero, zero);
     let mut at_blocks = [[0i32; 16]; 3];
-    for k in 0..3 {
+    for (k, at_edge) in at_blocks.iter_mut().enumerate() {
         let (edge, steps) = (&f.edges[k], f.edge_steps[k]);
         // Saturated at the tile's origin, and steps within a tile need 28 bits: signs stay right.
         let at = (steps << 2) + edge.at_saturated(x, y);
         outside |= at + edge.reach_up(3);
         partial |= at + edge.reach_down(3);
-        at.store_slice(&mut at_blocks[k]);
+        at.store_slice(at_edge);
     }
     let mut blocks = !(outside.simd_lt(zero).to_bitmask() as u32) & 0xFFFF;
     let whole = !(partial.simd_lt(zero).to_bitmask() as u32);
@@ -626,8 +626,8 @@ fn fill_tile<S: Simd>(
             0xFFFF
         } else {
             let mut outside = zero;
-            for k in 0..3 {
-                outside |= f.edge_steps[k] + at_blocks[k][c];
+            for (steps, at) in f.edge_steps.iter().zip(&at_blocks) {
+                outside |= *steps + at[c];
             }
             !(outside.simd_lt(zero).to_bitmask() as u32) & 0xFFFF
         };
