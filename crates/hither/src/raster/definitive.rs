@@ -15,7 +15,7 @@
 //! holds a side's value to 2⁻²² of 2¹⁶ pixels; sides are moved outwards by [`SLACK_PX`], twice the sum. A box that
 //! reaches the near plane, or with corners far outside the window, is not decided here.
 
-use super::fill::{COLUMN_F, ROW_F};
+use super::paint::{COLUMN_F, ROW_F};
 use super::pyramid::Rect;
 use super::transform::ScreenFromObject;
 use fearless_simd::{Simd, f32x16, prelude::*};

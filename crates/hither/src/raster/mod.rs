@@ -25,8 +25,11 @@ mod boxes;
 mod clip;
 mod definitive;
 mod fill;
+mod hidden;
+mod paint;
 mod pyramid;
 mod setup;
+mod small;
 mod transform;
 
 pub use boxes::{BoxSet, ProjectedBoxes, project_boxes};

@@ -8,11 +8,9 @@
 //! pixels. Pixels beyond the image's right and bottom border hold +∞: nothing is drawn there, and they
 //! never hold a minimum down.
 
-use super::definitive::Outline;
 use super::setup::Lanes;
-use super::transform::ScreenFromObject;
 use crate::conventions::SurfaceId;
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// A half-open rectangle of pixels, in window coordinates unless said otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,12 +39,12 @@ pub(super) struct Sixteen<T>(pub [T; 16]);
 
 /// Minima of one level, grouped by parent.
 #[derive(Debug, Default)]
-struct PyramidLevel {
-    columns: usize,
-    rows: usize,
-    min: Vec<Sixteen<f32>>,
+pub(super) struct PyramidLevel {
+    pub columns: usize,
+    pub rows: usize,
+    pub min: Vec<Sixteen<f32>>,
     /// Bit `c`: child `c`'s minimum is out of date (too far, hence still a bound).
-    stale: Vec<u16>,
+    pub stale: Vec<u16>,
 }
 
 /// Per-pixel visit counts, for pictures of complexity.
@@ -75,8 +73,8 @@ pub struct Target {
     pub(super) id: Vec<Sixteen<u32>>,
     /// The id that all pixels of a block share, or [`MIXED`]: most blocks never need their sixteen.
     pub(super) block_id: Vec<u32>,
-    touched: Vec<bool>,
-    levels: Vec<PyramidLevel>,
+    pub(super) touched: Vec<bool>,
+    pub(super) levels: Vec<PyramidLevel>,
     /// What the numbers in `id` stand for.
     pub(super) surfaces: Vec<SurfaceId>,
     pub(crate) visits: Option<Box<Visits>>,
@@ -192,308 +190,9 @@ impl Target {
         (block, (y % 4 * 4 + x % 4) as usize)
     }
 
-    /// Whether nothing at or behind `depth` could be seen anywhere in `rect`: Greene's fast
-    /// bounding-rectangle test. Exact for the rectangle: `false` means that at least one of its pixels
-    /// holds `depth` or something farther.
-    ///
-    /// `rect` is clipped to the window; an empty one is hidden. Cost: a few cells along its border.
-    pub fn is_hidden(&mut self, level: Level, rect: Rect, depth: f32) -> bool {
-        dispatch!(level, simd => self.hides(simd, rect, depth))
-    }
-
-    #[inline(always)]
-    pub(crate) fn hides<S: Simd>(&mut self, simd: S, rect: Rect, depth: f32) -> bool {
-        let left = rect.left.max(0);
-        let top = rect.top.max(0);
-        let right = rect.right.min(self.width) - 1;
-        let bottom = rect.bottom.min(self.height) - 1;
-        if left > right || top > bottom {
-            return true;
-        }
-        let rect = [left, top, right, bottom];
-        let extent = (right - left).max(bottom - top) as u32;
-        if extent < 16 {
-            // Most boxes are small: they ask the minima of at most 2×2 tiles, which are never stale.
-            for tile_y in (top >> 4)..=(bottom >> 4) {
-                for tile_x in (left >> 4)..=(right >> 4) {
-                    if self.shows_in_tile(simd, tile_x, tile_y, rect, depth) {
-                        return false;
-                    }
-                }
-            }
-            return true;
-        }
-        // Finest level at which the rectangle meets at most 2×2 parents: parents at level k have side
-        // 4^(k+2), and an extent below 4^(k+2) touches at most two of them.
-        let log4 = (31 - (extent | 15).leading_zeros()) / 2;
-        let top_level = (log4 as usize - 1).min(self.levels.len() - 1);
-        let shift = 2 * (top_level as u32 + 2);
-        for parent_y in (top >> shift)..=(bottom >> shift) {
-            for parent_x in (left >> shift)..=(right >> shift) {
-                if self.shows_in(simd, top_level, parent_x as usize, parent_y as usize, rect, depth) {
-                    return false;
-                }
-            }
-        }
-        true
-    }
-
-    /// A first, cheap look: whether the one pyramid sample around `[left, top, right, bottom]` (inclusive, in
-    /// the window) hides `depth` — step 2 of [Greene 1995, fig. 3.5]. Stale samples are too far, so still
-    /// a bound.
-    #[inline(always)]
-    pub(crate) fn one_sample_hides(&self, rect: [u16; 4], depth: f32) -> bool {
-        let [left, top, right, bottom] = rect;
-        let differ = u32::from((left ^ right) | (top ^ bottom));
-        // Finest cells of side 4^(k+1) that hold both corners.
-        let level = ((31 - (differ | 1).leading_zeros()) / 2) as usize;
-        let Some(samples) = self.levels.get(level) else { return false };
-        let shift = 2 * (level + 1);
-        let (x, y) = ((left >> shift) as usize, (top >> shift) as usize);
-        samples.min[(y >> 2) * samples.columns + (x >> 2)].0[(y & 3) * 4 + (x & 3)] > depth
-    }
-
-    /// Whether nothing at or behind `depth` could be seen anywhere in the outline of the box from `min` to
-    /// `max`, of whose rectangle `rect` [`Target::hides`] said no: the definitive test (see `definitive`).
-    #[inline(always)]
-    pub(crate) fn hides_outline<S: Simd>(
-        &mut self,
-        simd: S,
-        at: &ScreenFromObject,
-        bounds: [[f32; 3]; 2],
-        rect: Rect,
-        depth: f32,
-    ) -> bool {
-        let window = Rect {
-            left: self.left,
-            top: self.top,
-            right: self.left + self.width,
-            bottom: self.top + self.height,
-        };
-        let Some(outline) = Outline::new(at, bounds[0], bounds[1], window) else { return false };
-        let rect = [rect.left, rect.top, rect.right - 1, rect.bottom - 1];
-        let top = self.levels.len() - 1;
-        // Depth first, as `shows_in`, with the polygon's sides as a further sieve.
-        let mut stack = [(0u32, 0u32, 0u32); MAX_LEVELS + 1];
-        let mut level = top;
-        let (mut px, mut py) = (0u32, 0u32);
-        let mut bits = self.open_in_outline(simd, level, px, py, rect, depth, &outline);
-        loop {
-            if bits == 0 {
-                if level == top {
-                    return true;
-                }
-                level += 1;
-                (px, py, bits) = stack[level];
-                continue;
-            }
-            let c = bits.trailing_zeros();
-            bits &= bits - 1;
-            let (cx, cy) = (px * 4 + c % 4, py * 4 + c / 4);
-            if level > 0 {
-                let inner = self.open_in_outline(simd, level - 1, cx, cy, rect, depth, &outline);
-                if inner != 0 {
-                    stack[level] = (px, py, bits);
-                    level -= 1;
-                    (px, py, bits) = (cx, cy, inner);
-                }
-                continue;
-            }
-            let tile = py as usize * self.levels[0].columns + px as usize;
-            let pixels = self.pixels_at_or_behind(simd, tile, c as usize, cx as i32, cy as i32, rect, depth);
-            if pixels & outline.cells(simd, (cx * 4) as f32, (cy * 4) as f32, 1) != 0 {
-                return false;
-            }
-        }
-    }
-
-    /// The children of a parent that meet `rect` and the outline, and hold `depth` or something farther.
-    #[expect(clippy::too_many_arguments, reason = "the inner step of one search, split off to be read")]
-    #[inline(always)]
-    fn open_in_outline<S: Simd>(
-        &mut self,
-        simd: S,
-        level: usize,
-        px: u32,
-        py: u32,
-        rect: [i32; 4],
-        depth: f32,
-        outline: &Outline,
-    ) -> u32 {
-        let bits = self.children_at_or_behind(simd, level, px, py, rect, depth);
-        if bits == 0 {
-            return 0;
-        }
-        let side = 4i32 << (2 * level);
-        bits & outline.cells(simd, (px as i32 * side * 4) as f32, (py as i32 * side * 4) as f32, side)
-    }
-
-    /// Whether some pixel of `[left, top, right, bottom]` (inclusive) inside this tile holds `depth` or
-    /// something farther.
-    #[inline(always)]
-    fn shows_in_tile<S: Simd>(
-        &mut self,
-        simd: S,
-        tile_x: i32,
-        tile_y: i32,
-        rect: [i32; 4],
-        depth: f32,
-    ) -> bool {
-        let mut bits = match self.open_children(simd, 0, tile_x as u32, tile_y as u32, rect, depth) {
-            Children::Shown => return true,
-            Children::Open(bits) => bits,
-        };
-        let tile = tile_y as usize * self.tiles_x + tile_x as usize;
-        while bits != 0 {
-            let c = bits.trailing_zeros() as i32;
-            bits &= bits - 1;
-            let (bx, by) = (tile_x * 4 + (c & 3), tile_y * 4 + (c >> 2));
-            if self.pixels_at_or_behind(simd, tile, c as usize, bx, by, rect, depth) != 0 {
-                return true;
-            }
-        }
-        false
-    }
-
-    /// Whether some pixel of `[left, top, right, bottom]` (inclusive) inside this parent cell holds
-    /// `depth` or something farther.
-    #[inline(always)]
-    fn shows_in<S: Simd>(
-        &mut self,
-        simd: S,
-        top_level: usize,
-        parent_x: usize,
-        parent_y: usize,
-        rect: [i32; 4],
-        depth: f32,
-    ) -> bool {
-        // Depth first: for each level above the present one, the parent and its children still to visit.
-        let mut above = [(0u32, 0u32, 0u32); MAX_LEVELS];
-        let mut level = top_level;
-        let (mut px, mut py) = (parent_x as u32, parent_y as u32);
-        let mut bits = match self.open_children(simd, level, px, py, rect, depth) {
-            Children::Shown => return true,
-            Children::Open(bits) => bits,
-        };
-        loop {
-            if bits == 0 {
-                if level == top_level {
-                    return false;
-                }
-                level += 1;
-                (px, py, bits) = above[level];
-                continue;
-            }
-            let c = bits.trailing_zeros();
-            bits &= bits - 1;
-            let (cx, cy) = (px * 4 + c % 4, py * 4 + c / 4);
-            if level == 0 {
-                let tile = py as usize * self.levels[0].columns + px as usize;
-                if self.pixels_at_or_behind(simd, tile, c as usize, cx as i32, cy as i32, rect, depth) != 0 {
-                    return true;
-                }
-                continue;
-            }
-            let inner = match self.open_children(simd, level - 1, cx, cy, rect, depth) {
-                Children::Shown => return true,
-                Children::Open(inner) => inner,
-            };
-            if inner != 0 {
-                above[level] = (px, py, bits);
-                level -= 1;
-                (px, py, bits) = (cx, cy, inner);
-            }
-        }
-    }
-
-    /// Which of a parent's children meet `rect` and hold `depth` or something farther.
-    #[inline(always)]
-    fn children_at_or_behind<S: Simd>(
-        &mut self,
-        simd: S,
-        level: usize,
-        px: u32,
-        py: u32,
-        rect: [i32; 4],
-        depth: f32,
-    ) -> u32 {
-        let parent = py as usize * self.levels[level].columns + px as usize;
-        if level > 0 && self.levels[level].stale[parent] != 0 {
-            self.refresh(simd, level, parent);
-        }
-        let shift = 2 * (level as u32 + 1);
-        let (base_x, base_y) = ((px as i32) << 2, (py as i32) << 2);
-        let meets = cell_mask(
-            ((rect[0] >> shift) - base_x).max(0),
-            ((rect[1] >> shift) - base_y).max(0),
-            ((rect[2] >> shift) - base_x).min(3),
-            ((rect[3] >> shift) - base_y).min(3),
-        );
-        if self.visits.is_some() {
-            self.count_cube_visit(level, parent, meets);
-        }
-        let values = f32x16::from_slice(simd, &self.levels[level].min[parent].0);
-        values.simd_le(f32x16::splat(simd, depth)).to_bitmask() as u32 & meets
-    }
-
-    /// The same; or that one of them lies wholly inside `rect`, whose minimum is then a pixel of it.
-    #[inline(always)]
-    fn open_children<S: Simd>(
-        &mut self,
-        simd: S,
-        level: usize,
-        px: u32,
-        py: u32,
-        rect: [i32; 4],
-        depth: f32,
-    ) -> Children {
-        let bits = self.children_at_or_behind(simd, level, px, py, rect, depth);
-        if bits == 0 {
-            return Children::Open(0);
-        }
-        let shift = 2 * (level as u32 + 1);
-        let (base_x, base_y) = ((px as i32) << 2, (py as i32) << 2);
-        let up = (1i32 << shift) - 1;
-        let whole = cell_mask(
-            (((rect[0] + up) >> shift) - base_x).max(0),
-            (((rect[1] + up) >> shift) - base_y).max(0),
-            (((rect[2] + 1) >> shift) - base_x - 1).min(3),
-            (((rect[3] + 1) >> shift) - base_y - 1).min(3),
-        );
-        if bits & whole != 0 { Children::Shown } else { Children::Open(bits) }
-    }
-
-    /// Which of a block's pixels lie in `rect` and hold `depth` or something farther.
-    #[expect(clippy::too_many_arguments, reason = "the last step of two searches")]
-    #[inline(always)]
-    fn pixels_at_or_behind<S: Simd>(
-        &mut self,
-        simd: S,
-        tile: usize,
-        block: usize,
-        bx: i32,
-        by: i32,
-        rect: [i32; 4],
-        depth: f32,
-    ) -> u32 {
-        let x0 = (rect[0] - bx * 4).max(0);
-        let y0 = (rect[1] - by * 4).max(0);
-        let x1 = (rect[2] - bx * 4).min(3);
-        let y1 = (rect[3] - by * 4).min(3);
-        let mask = cell_mask(x0, y0, x1, y1);
-        if !self.touched[tile] {
-            return mask;
-        }
-        let values = f32x16::from_slice(simd, &self.depth[tile * 16 + block].0);
-        if let Some(visits) = &mut self.visits {
-            add_visits(&mut visits.cubes, self.width, self.height, (bx * 4, by * 4), 1, mask);
-        }
-        values.simd_le(f32x16::splat(simd, depth)).to_bitmask() as u32 & mask
-    }
-
     /// Brings the minima of `parent`'s stale children up to date.
     #[inline(always)]
-    fn refresh<S: Simd>(&mut self, simd: S, level: usize, parent: usize) {
+    pub(super) fn refresh<S: Simd>(&mut self, simd: S, level: usize, parent: usize) {
         refresh_level(simd, &mut self.levels, level, parent);
     }
 
@@ -582,7 +281,7 @@ impl Target {
     }
 
     #[inline(always)]
-    fn count_cube_visit(&mut self, level: usize, parent: usize, mask: u32) {
+    pub(super) fn count_cube_visit(&mut self, level: usize, parent: usize, mask: u32) {
         if let Some(visits) = &mut self.visits {
             let side = 4i32 << (2 * level);
             let columns = self.levels[level].columns;
@@ -603,16 +302,8 @@ impl Target {
 /// No id: a block's pixels have their own.
 pub(super) const MIXED: u32 = u32::MAX;
 
-/// What a parent's children say of a rectangle at a depth.
-enum Children {
-    /// It shows in one of them.
-    Shown,
-    /// It may show in these.
-    Open(u32),
-}
-
 /// Levels of the pyramid of the largest image: tiles of 16 pixels, then four times as much each.
-const MAX_LEVELS: usize = 8;
+pub(super) const MAX_LEVELS: usize = 8;
 
 /// Brings stale minima up to date, from the leaves of the stale subtree upwards.
 #[inline(always)]
@@ -661,7 +352,14 @@ pub(super) fn cell_mask(x0: i32, y0: i32, x1: i32, y1: i32) -> u32 {
 
 /// Adds 1/side² to every pixel of the children in `mask` [Greene 1995, §3.5.3].
 #[inline(never)]
-fn add_visits(plane: &mut [f32], width: i32, height: i32, corner: (i32, i32), side: i32, mask: u32) {
+pub(super) fn add_visits(
+    plane: &mut [f32],
+    width: i32,
+    height: i32,
+    corner: (i32, i32),
+    side: i32,
+    mask: u32,
+) {
     let share = 1.0 / (side * side) as f32;
     for c in (0..16).filter(|c| mask & (1 << c) != 0) {
         let (x0, y0) = (corner.0 + c % 4 * side, corner.1 + c / 4 * side);
