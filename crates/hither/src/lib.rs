@@ -10,6 +10,7 @@
 
 pub mod conventions;
 pub mod geometry;
+pub mod hidden_line;
 pub mod index;
 pub mod raster;
 pub mod reference;

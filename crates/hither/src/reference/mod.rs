@@ -4,9 +4,11 @@
 //!   together with how sure that is. [`Probe::judge`] holds any other answer against it.
 //! - [`zbuffer`] is the textbook z-buffer with the fill rule of `conventions`: a second witness that shares
 //!   nothing with the first but the scene, and the plain code that speed-ups are measured against.
+//! - [`lines`] samples the edges of a line drawing densely and casts a ray to each sample.
 //! - [`trouble`] makes small scenes that lean towards trouble, for both and for everything else.
 
 mod caster;
+pub mod lines;
 mod probe;
 pub mod trouble;
 pub mod zbuffer;

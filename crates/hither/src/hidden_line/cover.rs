@@ -1,0 +1,237 @@
+//! What is certainly hidden: for each cell of the grid, a depth beyond which nothing can be seen.
+//!
+//! Take the nearest triangle at a cell's centre and walk from it to neighbours, over every edge that enters
+//! the cell. If the walk meets no fold, no boundary and no missing triangle, then what was walked covers the
+//! whole cell: projected, it is a surface without a border inside a region that is simply connected. All
+//! that is farther than the farthest of it is hidden there, however small the triangles are. A walk that
+//! fails says nothing about the cell.
+//!
+//! Conservative: a hidden thing may be missed, a visible one is never called hidden.
+
+use super::grid::{Cells, Grid, rectangle};
+use super::shown::{Fate, Shown, Solid};
+use super::topology::NONE;
+use glam::{DVec2, DVec3};
+
+/// A walk that grows beyond this is given up: the cell is too rich to be settled cheaply.
+const LONGEST_WALK: usize = 192;
+
+/// Depths by cell, and what finding them needs.
+pub(super) struct Cover {
+    pub grid: Grid,
+    /// Whatever has a smaller w, at a point in this cell, is hidden there.
+    bound: Vec<f64>,
+    /// Nearest surface of the present solid at a cell's centre: w and triangle.
+    nearest: Vec<(f64, u32)>,
+    touched: Vec<u32>,
+    /// The walk that came to a triangle last.
+    visited: Vec<u32>,
+    walk: u32,
+}
+
+impl Cover {
+    pub fn new(grid: Grid) -> Cover {
+        Cover {
+            grid,
+            bound: vec![f64::NEG_INFINITY; grid.len()],
+            nearest: vec![(f64::NEG_INFINITY, NONE); grid.len()],
+            touched: Vec::new(),
+            visited: Vec::new(),
+            walk: 0,
+        }
+    }
+
+    /// Whether everything in these cells that is no nearer than `w` is hidden.
+    pub fn hides(&self, cells: Cells, w: f64) -> bool {
+        (cells.rows.0..=cells.rows.1).all(|row| {
+            let at = row * self.grid.columns;
+            self.bound[at + cells.columns.0..=at + cells.columns.1].iter().all(|&bound| bound > w)
+        })
+    }
+
+    /// Lets the last solid of `shown` cover what it covers. Triangles that `hides` says no to are not there.
+    pub fn add(&mut self, shown: &Shown, hides: impl Fn(u32) -> bool) {
+        let Some(solid) = shown.solids.last() else { return };
+        for t in solid.first_triangle..solid.first_triangle + solid.triangle_count {
+            if shown.facing[t as usize] != 0 && hides(t) {
+                self.sample(shown, t);
+            }
+        }
+        self.visited.clear();
+        self.visited.resize(solid.triangle_count as usize, 0);
+        self.walk = 0;
+        for at in std::mem::take(&mut self.touched) {
+            let (w, triangle) = std::mem::replace(&mut self.nearest[at as usize], (f64::NEG_INFINITY, NONE));
+            if w > self.bound[at as usize]
+                && let Some(farthest) = self.walk_from(shown, solid, triangle, at as usize, &hides)
+            {
+                let bound = farthest - shown.lens.coarse(farthest);
+                self.bound[at as usize] = self.bound[at as usize].max(bound);
+            }
+        }
+    }
+
+    /// Notes a triangle at the centres that it covers, if it is the nearest there.
+    fn sample(&mut self, shown: &Shown, triangle: u32) {
+        let grid = self.grid;
+        let [a, b, c] = shown.corners(triangle);
+        let (min, max) = rectangle([a, b, c]);
+        let last = grid.origin + DVec2::new(grid.columns as f64, grid.rows as f64) * grid.size;
+        if max.x < grid.origin.x || max.y < grid.origin.y || min.x > last.x || min.y > last.y {
+            return;
+        }
+        let plane = Plane::through(a, b, c);
+        let cells = grid.cells(min, max);
+        for row in cells.rows.0..=cells.rows.1 {
+            let y = grid.center(0, row).y;
+            let Some((from, to)) = span([a, b, c], y) else { continue };
+            let first = grid.column(from).max(cells.columns.0);
+            let end = grid.column(to).min(cells.columns.1);
+            for column in first..=end {
+                let center = grid.center(column, row);
+                if center.x < from || center.x > to {
+                    continue;
+                }
+                let at = grid.index(column, row);
+                let w = plane.at(center).min(a.z.max(b.z).max(c.z));
+                if w > self.bound[at] && w > self.nearest[at].0 {
+                    if self.nearest[at].1 == NONE {
+                        self.touched.push(at as u32);
+                    }
+                    self.nearest[at] = (w, triangle);
+                }
+            }
+        }
+    }
+
+    /// Walks over a cell from one triangle on; the smallest w of what covers it, if it is covered.
+    fn walk_from(
+        &mut self,
+        shown: &Shown,
+        solid: &Solid,
+        triangle: u32,
+        cell: usize,
+        hides: &impl Fn(u32) -> bool,
+    ) -> Option<f64> {
+        self.walk += 1;
+        let half = self.grid.size * 0.5;
+        let center = self.grid.center(cell % self.grid.columns, cell / self.grid.columns);
+        // Room for the rounding of coordinates far outside the picture.
+        let reach = half * (1.0 + 1e-6) + center.abs().max_element() * 1e-12;
+        let mut farthest = f64::INFINITY;
+        let mut stack = [triangle; LONGEST_WALK];
+        let (mut height, mut steps) = (1, 0);
+        self.visited[(triangle - solid.first_triangle) as usize] = self.walk;
+        while height > 0 {
+            height -= 1;
+            steps += 1;
+            let t = stack[height];
+            let corners = shown.corners(t);
+            let lowest = corners[0].z.min(corners[1].z).min(corners[2].z);
+            let [a, b, c] = corners;
+            farthest = farthest.min(lowest.max(Plane::through(a, b, c).least(center, reach)));
+            for k in 0..3 {
+                if !enters(corners[k], corners[(k + 1) % 3], center, reach) {
+                    continue;
+                }
+                let next = across(shown, solid, t, k)?;
+                if !hides(next) {
+                    return None;
+                }
+                let seen = &mut self.visited[(next - solid.first_triangle) as usize];
+                if *seen != self.walk {
+                    *seen = self.walk;
+                    if height == LONGEST_WALK || steps + height >= LONGEST_WALK {
+                        return None;
+                    }
+                    stack[height] = next;
+                    height += 1;
+                }
+            }
+        }
+        Some(farthest)
+    }
+}
+
+/// The triangle that continues the surface over edge `k` of `t`; `None` at a fold or where there is none.
+fn across(shown: &Shown, solid: &Solid, t: u32, k: usize) -> Option<u32> {
+    let origin = shown.origin(solid, t) as usize;
+    if solid.cut.as_ref().is_some_and(|cut| !cut.whole[origin]) {
+        return None;
+    }
+    let neighbour = solid.topology.neighbours[origin][k];
+    if neighbour == NONE || solid.cut.as_ref().is_some_and(|cut| !cut.whole[neighbour as usize]) {
+        return None;
+    }
+    let next = shown.place(solid, neighbour);
+    let sense = if solid.topology.flips[origin] >> k & 1 == 1 { -1 } else { 1 };
+    (next != NONE && shown.facing[t as usize] * shown.facing[next as usize] * sense > 0).then_some(next)
+}
+
+/// Whether the segment may come within the square around `center`. Errs towards yes.
+fn enters(p: DVec3, q: DVec3, center: DVec2, reach: f64) -> bool {
+    let (p, q) = (p.truncate() - center, q.truncate() - center);
+    let (low, high) = (p.min(q), p.max(q));
+    if low.x > reach || low.y > reach || high.x < -reach || high.y < -reach {
+        return false;
+    }
+    let d = q - p;
+    let offset = d.perp_dot(-p).abs();
+    offset <= reach * (d.x.abs() + d.y.abs()) * (1.0 + 1e-9) + 1e-12 * p.abs().max_element() * d.abs().max_element()
+}
+
+/// Where a horizontal line is inside a triangle.
+fn span(corners: [DVec3; 3], y: f64) -> Option<(f64, f64)> {
+    let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
+    for k in 0..3 {
+        let (p, q) = (corners[k], corners[(k + 1) % 3]);
+        if (p.y <= y) != (q.y <= y) {
+            let x = p.x + (q.x - p.x) * ((y - p.y) / (q.y - p.y));
+            from = from.min(x);
+            to = to.max(x);
+        }
+    }
+    (from <= to).then_some((from, to))
+}
+
+/// w over the paper as a plane.
+pub(super) struct Plane {
+    at: DVec3,
+    slope: DVec2,
+}
+
+impl Plane {
+    pub fn through(a: DVec3, b: DVec3, c: DVec3) -> Plane {
+        let n = (b - a).cross(c - a);
+        Plane { at: a, slope: DVec2::new(-n.x, -n.y) / n.z }
+    }
+
+    pub fn at(&self, p: DVec2) -> f64 {
+        self.at.z + self.slope.dot(p - self.at.truncate())
+    }
+
+    /// The smallest value within the square; NaN or −∞ for a plane seen edge-on.
+    fn least(&self, center: DVec2, reach: f64) -> f64 {
+        let middle = self.at(center);
+        let error = middle.abs() * 1e-12;
+        middle - (self.slope.x.abs() + self.slope.y.abs()) * reach - error
+    }
+}
+
+/// Marks what cannot be seen: triangles outside the picture, and those that `cover` hides.
+pub(super) fn settle(shown: &mut Shown, cover: Option<&Cover>, picture: DVec2) {
+    for t in 0..shown.triangles.len() {
+        if shown.fate[t] != Fate::Live {
+            continue;
+        }
+        let [a, b, c] = shown.corners(t as u32);
+        let (min, max) = rectangle([a, b, c]);
+        let outside = max.x < 0.0 || max.y < 0.0 || min.x > picture.x || min.y > picture.y;
+        let nearest = a.z.max(b.z).max(c.z);
+        if outside {
+            shown.fate[t] = Fate::Outside;
+        } else if cover.is_some_and(|cover| cover.hides(cover.grid.cells(min, max), nearest)) {
+            shown.fate[t] = Fate::Hidden;
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! From a preparation and a view to a drawing: the order of the work.
+
+use super::coincident;
+use super::cover::{self, Cover};
+use super::drawing::{Counters, Drawing, Kind};
+use super::edges::Choice;
+use super::grid::Grid;
+use super::intersections;
+use super::lens::{HalfSpace, Lens};
+use super::occluders::Occluders;
+use super::shown::{Fate, Shown};
+use super::strokes;
+use super::trace::{Scratch, Tracer};
+use super::{LineOptions, Preparation};
+use crate::conventions::{View, ViewError};
+use crate::geometry::Aabb;
+use glam::{DAffine3, DVec2, DVec3};
+use rayon::prelude::*;
+
+/// Edges that one thread traces at a time.
+const CHUNK: usize = 4096;
+
+/// The longest side of the grid, cells.
+const MOST_CELLS: usize = 768;
+
+/// A line on the paper before it is joined to others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Piece {
+    pub ends: [DVec2; 2],
+    pub part: u32,
+    pub kind: Kind,
+    pub covers: u32,
+}
+
+/// An instance and where its box is on the paper.
+struct Placed {
+    part: u32,
+    mesh: u32,
+    view_from_mesh: DAffine3,
+    cut: bool,
+    min: DVec2,
+    max: DVec2,
+    nearest: f64,
+}
+
+impl Preparation {
+    /// Draws what `view` sees. Errors: a view that cannot be drawn ([`View::validate`]).
+    pub fn draw(&self, view: &View, options: &LineOptions) -> Result<Drawing, ViewError> {
+        view.validate()?;
+        let threads = match options.threads {
+            0 => std::thread::available_parallelism().map_or(1, usize::from),
+            n => n,
+        };
+        if threads == 1 {
+            return Ok(self.drawing(view, options, false));
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        Ok(match pool {
+            Ok(pool) => pool.install(|| self.drawing(view, options, true)),
+            Err(_) => self.drawing(view, options, false),
+        })
+    }
+
+    fn drawing(&self, view: &View, options: &LineOptions, parallel: bool) -> Drawing {
+        let lens = Lens::new(view, self.tolerance);
+        let picture = DVec2::new(f64::from(view.width), f64::from(view.height));
+        let planes = planes(view, options);
+        let placed = self.place(view, &lens, &planes, picture);
+        let mut counters = Counters {
+            instances_culled: (self.instances.len() - placed.len()) as u64,
+            ..Counters::default()
+        };
+        let (shown, cover) = self.show(lens, planes, &placed, options, picture, &mut counters);
+        let grid = cover.as_ref().map_or_else(|| grid_over(&placed, picture, shown.triangles.len()), |c| c.grid);
+        let see_through = see_through(&shown, options);
+        let occluders = Occluders::new(&shown, grid, |t| !see_through(t));
+        counters.triangles = shown.triangles.len() as u64;
+        counters.triangles_live = occluders.list.len() as u64;
+        let tracer = Tracer {
+            shown: &shown,
+            occluders: &occluders,
+            cover: cover.as_ref(),
+            picture,
+            counts: options.hidden,
+        };
+        let mut pieces = trace_edges(&tracer, options, parallel, &mut counters);
+        if options.kinds.intersection || options.kinds.contact || !shown.sections.is_empty() {
+            intersections::add(&tracer, options, parallel, &mut pieces, &mut counters);
+        }
+        counters.segments = pieces.len() as u64;
+        counters.visible_segments = pieces.iter().filter(|p| p.covers == 0).count() as u64;
+        coincident::draw_once(&mut pieces);
+        let (points, strokes) = strokes::join(pieces);
+        Drawing { width: picture.x, height: picture.y, points, strokes, counters }
+    }
+
+    /// Instances that are in the view, nearest first.
+    fn place(&self, view: &View, lens: &Lens, planes: &[HalfSpace], picture: DVec2) -> Vec<Placed> {
+        let mut placed: Vec<Placed> = Vec::new();
+        for (part, (mesh, world_from_mesh)) in self.instances.iter().enumerate() {
+            let view_from_mesh = view.view_from_world * *world_from_mesh;
+            let Some((cut, min, max, nearest)) =
+                on_paper(&self.bounds[*mesh as usize], &view_from_mesh, lens, planes, picture)
+            else {
+                continue;
+            };
+            placed.push(Placed { part: part as u32, mesh: *mesh, view_from_mesh, cut, min, max, nearest });
+        }
+        placed.sort_by(|a, b| b.nearest.total_cmp(&a.nearest).then(a.part.cmp(&b.part)));
+        placed
+    }
+
+    /// Projects what may be seen, and learns on the way what cannot.
+    fn show<'p>(
+        &'p self,
+        lens: Lens,
+        planes: Vec<HalfSpace>,
+        placed: &[Placed],
+        options: &LineOptions,
+        picture: DVec2,
+        counters: &mut Counters,
+    ) -> (Shown<'p>, Option<Cover>) {
+        let mut shown = Shown::new(lens, planes);
+        let triangles: usize = placed.iter().map(|p| self.meshes[p.mesh as usize].triangles.len()).sum();
+        let mut cover = (!options.hidden).then(|| Cover::new(grid_over(placed, picture, triangles)));
+        for p in placed {
+            if let Some(cover) = &cover
+                && !p.cut
+                && cover.hides(cover.grid.cells(p.min, p.max), p.nearest)
+            {
+                counters.instances_culled += 1;
+                continue;
+            }
+            shown.add(&self.meshes[p.mesh as usize], p.part, &p.view_from_mesh, p.cut);
+            if let Some(cover) = &mut cover {
+                let see_through = see_through(&shown, options);
+                cover.add(&shown, |t| !see_through(t));
+            }
+        }
+        cover::settle(&mut shown, cover.as_ref(), picture);
+        (shown, cover)
+    }
+}
+
+/// Which triangles hide nothing.
+fn see_through<'a>(shown: &'a Shown, options: &LineOptions) -> impl Fn(u32) -> bool + use<'a> {
+    let asked = !options.transparent_hides && shown.solids.iter().any(|s| !s.topology.see_through.is_empty());
+    move |t: u32| {
+        asked && {
+            let solid = &shown.solids[shown.solid_of(t)];
+            let of = &solid.topology.see_through;
+            !of.is_empty() && of[shown.origin(solid, t) as usize]
+        }
+    }
+}
+
+fn planes(view: &View, options: &LineOptions) -> Vec<HalfSpace> {
+    let mut planes = Lens::range(&view.projection);
+    for section in &options.sections {
+        let normal = -(view.view_from_world.matrix3 * section.normal.normalize_or_zero());
+        let point = view.view_from_world.transform_point3(section.point);
+        planes.push(HalfSpace { normal, offset: -normal.dot(point), section: true });
+    }
+    planes
+}
+
+/// Whether a plane may cut a box, its rectangle on the paper and its nearest w; `None` if it is not seen.
+fn on_paper(
+    bounds: &Aabb,
+    view_from_mesh: &DAffine3,
+    lens: &Lens,
+    planes: &[HalfSpace],
+    picture: DVec2,
+) -> Option<(bool, DVec2, DVec2, f64)> {
+    if bounds.is_empty() {
+        return None;
+    }
+    let corners: [DVec3; 8] = std::array::from_fn(|i| {
+        let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+        view_from_mesh.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
+    });
+    let mut cut = false;
+    for plane in planes {
+        let sides = corners.map(|c| plane.side(c));
+        let slack = 1e-9 * corners.iter().fold(plane.offset.abs(), |m, c| m.max(c.abs().max_element()));
+        if sides.iter().all(|&s| s < -slack) {
+            return None;
+        }
+        cut |= sides.iter().any(|&s| s <= slack);
+    }
+    if cut {
+        return Some((true, DVec2::ZERO, picture, f64::INFINITY));
+    }
+    let projected = corners.map(|c| lens.project(c));
+    let (min, max) = super::grid::rectangle(projected);
+    if max.x < 0.0 || max.y < 0.0 || min.x > picture.x || min.y > picture.y {
+        return None;
+    }
+    let nearest = projected.iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.z));
+    Some((false, min, max, nearest + nearest.abs() * 1e-12))
+}
+
+/// A grid over what is on the paper, with about as many cells as there are triangles to see.
+fn grid_over(placed: &[Placed], picture: DVec2, triangles: usize) -> Grid {
+    let (mut min, mut max) = (picture, DVec2::ZERO);
+    for p in placed {
+        min = min.min(p.min);
+        max = max.max(p.max);
+    }
+    let (min, max) = (min.max(DVec2::ZERO), max.min(picture));
+    let side = ((triangles as f64).sqrt() * 0.75) as usize;
+    Grid::over(min, max.max(min), side.clamp(8, MOST_CELLS))
+}
+
+/// Follows every edge that is to be drawn.
+fn trace_edges(tracer: &Tracer, options: &LineOptions, parallel: bool, counters: &mut Counters) -> Vec<Piece> {
+    let choice = Choice::new(options.kinds, options.crease_angle, options.hidden);
+    let shown = tracer.shown;
+    let mut work = Vec::new();
+    for (s, solid) in shown.solids.iter().enumerate() {
+        let edges = solid.topology.edges.len();
+        work.extend((0..edges).step_by(CHUNK).map(|at| (s, at..(at + CHUNK).min(edges))));
+    }
+    let trace = |scratch: &mut Scratch, (s, range): &(usize, std::ops::Range<usize>)| {
+        let solid = &shown.solids[*s];
+        let mut pieces = Vec::new();
+        let mut lines = 0;
+        for edge in &solid.topology.edges[range.clone()] {
+            let Some(kind) = choice.kind(shown, solid, edge) else { continue };
+            let Some(ends) = shown.edge(solid, edge.vertices) else { continue };
+            let [p, q] = ends.map(|v| shown.screen[v as usize]);
+            if (q - p).truncate() == DVec2::ZERO {
+                continue;
+            }
+            lines += 1;
+            let own = |t: u32| has_edge(&shown.triangles[t as usize], ends);
+            tracer.trace(p, q, own, scratch);
+            push_parts(&mut pieces, p, q, solid.part, kind, scratch);
+        }
+        (pieces, lines, std::mem::take(&mut scratch.tests))
+    };
+    let new_scratch = || Scratch::new(tracer.occluders);
+    let found: Vec<_> = if parallel {
+        work.par_iter().map_init(new_scratch, trace).collect()
+    } else {
+        let mut scratch = new_scratch();
+        work.iter().map(|w| trace(&mut scratch, w)).collect()
+    };
+    let mut all = Vec::with_capacity(found.iter().map(|f| f.0.len()).sum());
+    for (pieces, lines, tests) in found {
+        all.extend(pieces);
+        counters.lines += lines;
+        counters.tests += tests;
+    }
+    all
+}
+
+/// Turns the parts that tracing found into pieces.
+pub(super) fn push_parts(
+    pieces: &mut Vec<Piece>,
+    p: DVec3,
+    q: DVec3,
+    part: u32,
+    kind: Kind,
+    scratch: &Scratch,
+) {
+    let (a, b) = (p.truncate(), q.truncate());
+    // The ends themselves stay as they are, so that lines that meet there meet in every bit.
+    let at = |t: f64| if t == 0.0 { a } else if t == 1.0 { b } else { a + (b - a) * t };
+    for found in &scratch.parts {
+        pieces.push(Piece { ends: [at(found.from), at(found.to)], part, kind, covers: found.covers });
+    }
+}
+
+/// Whether anything of a triangle may be seen.
+pub(super) fn is_live(shown: &Shown, triangle: u32) -> bool {
+    shown.fate[triangle as usize] == Fate::Live
+}
+
+/// Whether two vertices are both corners of a triangle.
+pub(super) fn has_edge(triangle: &[u32; 3], ends: [u32; 2]) -> bool {
+    triangle.contains(&ends[0]) && triangle.contains(&ends[1])
+}

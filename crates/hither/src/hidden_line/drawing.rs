@@ -1,0 +1,114 @@
+//! What a drawing consists of.
+
+use glam::DVec2;
+use std::ops::Range;
+
+/// Why a line is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// The outline of a cut by a section plane.
+    Section,
+    /// Where a surface ends, or more than two meet.
+    Boundary,
+    /// Where a surface turns away from the eye.
+    Silhouette,
+    /// Where a surface bends.
+    Crease,
+    /// Where surfaces pass through each other.
+    Intersection,
+    /// Where an edge lies on another surface.
+    Contact,
+    /// Where a material ends.
+    Border,
+    /// What the user marked.
+    Marked,
+}
+
+impl Kind {
+    /// Every kind, in the order in which one that lies on another is preferred.
+    pub const ALL: [Kind; 8] = [
+        Kind::Section,
+        Kind::Boundary,
+        Kind::Silhouette,
+        Kind::Crease,
+        Kind::Intersection,
+        Kind::Contact,
+        Kind::Border,
+        Kind::Marked,
+    ];
+
+    /// Its name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Section => "section",
+            Kind::Boundary => "boundary",
+            Kind::Silhouette => "silhouette",
+            Kind::Crease => "crease",
+            Kind::Intersection => "intersection",
+            Kind::Contact => "contact",
+            Kind::Border => "border",
+            Kind::Marked => "marked",
+        }
+    }
+}
+
+/// A run of line segments that a pen draws without being lifted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stroke {
+    /// The instance that it belongs to; of an intersection, the one with the smaller number.
+    pub part: u32,
+    /// Why it is drawn.
+    pub kind: Kind,
+    /// How many triangles cover it; 0 is visible.
+    pub covers: u32,
+    /// Its points, in [`Drawing::points`]; at least two. A closed stroke ends with its first point.
+    pub points: Range<u32>,
+}
+
+/// What was done for a drawing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Instances that were left out: outside the picture, or wholly hidden.
+    pub instances_culled: u64,
+    /// Triangles of the other instances.
+    pub triangles: u64,
+    /// Of these, left in for exact tests.
+    pub triangles_live: u64,
+    /// Edges and intersections that were followed.
+    pub lines: u64,
+    /// Exact tests of a line against a triangle.
+    pub tests: u64,
+    /// Line segments before joining.
+    pub segments: u64,
+    /// Of these, visible.
+    pub visible_segments: u64,
+}
+
+/// A line drawing.
+#[derive(Clone, Debug, Default)]
+pub struct Drawing {
+    /// Width of the paper, pixels.
+    pub width: f64,
+    /// Height of the paper, pixels.
+    pub height: f64,
+    /// Points of all strokes, pixels, +y down.
+    pub points: Vec<DVec2>,
+    /// What to draw, grouped by part, then visible before hidden, then by kind; within a group in an order
+    /// with short ways between strokes.
+    pub strokes: Vec<Stroke>,
+    /// What was done.
+    pub counters: Counters,
+}
+
+impl Drawing {
+    /// The points of a stroke.
+    pub fn points_of(&self, stroke: &Stroke) -> &[DVec2] {
+        &self.points[stroke.points.start as usize..stroke.points.end as usize]
+    }
+
+    /// Total length of what is visible, pixels.
+    pub fn visible_length(&self) -> f64 {
+        let visible = self.strokes.iter().filter(|s| s.covers == 0);
+        visible.flat_map(|s| self.points_of(s).windows(2)).map(|p| p[0].distance(p[1])).sum()
+    }
+}

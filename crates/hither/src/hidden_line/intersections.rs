@@ -1,0 +1,226 @@
+//! Lines in which surfaces meet: where they pass through each other, and where an edge of one lies on the
+//! other.
+//!
+//! Pairs of triangles that may be seen are found through the grid: those whose boxes and depths overlap.
+//! Of a pair each triangle cuts the other's plane in a segment; both segments lie on the line common to the
+//! planes, and their overlap is where the triangles meet. A corner nearer to the other's plane than the
+//! tolerance lies in it. The cut of an edge by a plane is computed the same for all triangles at that edge,
+//! so that the segments of neighbouring pairs meet in every bit.
+
+use super::LineOptions;
+use super::draw::{Piece, has_edge, is_live, push_parts};
+use super::drawing::{Counters, Kind};
+use super::shown::Shown;
+use super::topology::NONE;
+use super::trace::{Scratch, Tracer};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Planes at a smaller angle than this, radians, are one plane.
+const PARALLEL: f64 = 1e-7;
+
+/// A line in which two triangles meet.
+struct Meeting {
+    ends: [DVec3; 2],
+    kind: Kind,
+    triangles: [u32; 2],
+}
+
+/// Finds the lines in which the live triangles meet, and those of sections; follows them, and adds their
+/// parts to `pieces`. Cost: the pairs of triangles that overlap on the paper and in depth.
+pub(super) fn add(
+    tracer: &Tracer,
+    options: &LineOptions,
+    parallel: bool,
+    pieces: &mut Vec<Piece>,
+    counters: &mut Counters,
+) {
+    let kinds = &options.kinds;
+    let of_row = |scratch: &mut Scratch, row: usize| {
+        let mut found = Vec::new();
+        if kinds.intersection || kinds.contact {
+            meetings_in_row(tracer, row, &mut found);
+        }
+        found.retain(|m| match m.kind {
+            Kind::Intersection => kinds.intersection,
+            _ => kinds.contact,
+        });
+        let mut pieces = Vec::new();
+        for meeting in &found {
+            let [p, q] = meeting.ends.map(|e| tracer.shown.lens.project(e));
+            if p.truncate() == q.truncate() {
+                continue;
+            }
+            tracer.trace(p, q, |t| meeting.triangles.contains(&t), scratch);
+            let part = meeting.triangles.map(|t| tracer.shown.solids[tracer.shown.solid_of(t)].part);
+            push_parts(&mut pieces, p, q, part[0].min(part[1]), meeting.kind, scratch);
+        }
+        (pieces, found.len() as u64, std::mem::take(&mut scratch.tests))
+    };
+    let rows = tracer.occluders.grid.rows;
+    let new_scratch = || Scratch::new(tracer.occluders);
+    let found: Vec<_> = if parallel {
+        (0..rows).into_par_iter().map_init(new_scratch, of_row).collect()
+    } else {
+        let mut scratch = new_scratch();
+        (0..rows).map(|row| of_row(&mut scratch, row)).collect()
+    };
+    for (more, lines, tests) in found {
+        pieces.extend(more);
+        counters.lines += lines;
+        counters.tests += tests;
+    }
+    add_sections(tracer, pieces, counters);
+}
+
+/// The outlines of cuts.
+fn add_sections(tracer: &Tracer, pieces: &mut Vec<Piece>, counters: &mut Counters) {
+    let shown = tracer.shown;
+    let mut scratch = Scratch::new(tracer.occluders);
+    for line in &shown.sections {
+        let [p, q] = line.vertices.map(|v| shown.screen[v as usize]);
+        if p.truncate() == q.truncate() {
+            continue;
+        }
+        tracer.trace(p, q, |t| has_edge(&shown.triangles[t as usize], line.vertices), &mut scratch);
+        push_parts(pieces, p, q, shown.solids[line.solid as usize].part, Kind::Section, &scratch);
+        counters.lines += 1;
+    }
+    counters.tests += scratch.tests;
+}
+
+/// The meetings of triangles whose boxes' overlap begins in a row of cells.
+fn meetings_in_row(tracer: &Tracer, row: usize, found: &mut Vec<Meeting>) {
+    let (shown, occluders) = (tracer.shown, tracer.occluders);
+    let grid = &occluders.grid;
+    for column in 0..grid.columns {
+        let cell = occluders.in_cell(grid.index(column, row));
+        for (i, &a) in cell.iter().enumerate() {
+            let first = &occluders.list[a as usize];
+            let ra = first.rectangle();
+            let least = first.farthest - shown.lens.coarse(first.nearest);
+            for &b in &cell[i + 1..] {
+                let second = &occluders.list[b as usize];
+                if second.nearest < least {
+                    break;
+                }
+                if !second.meets(&ra) {
+                    continue;
+                }
+                // Pairs share several cells. Small ones count in the cell where their boxes' overlap begins;
+                // a large one may not be in that cell, but is where the middle of the meeting is.
+                let here = |x: f64, y: f64| grid.column(x) == column && grid.row(y) == row;
+                if first.large || second.large {
+                    let found_here = meeting(shown, first.triangle, second.triangle).filter(|m| {
+                        let middle = shown.lens.project((m.ends[0] + m.ends[1]) * 0.5);
+                        here(middle.x, middle.y)
+                    });
+                    found.extend(found_here);
+                    continue;
+                }
+                let rb = second.rectangle();
+                if here(f64::from(ra[0].max(rb[0])), f64::from(ra[1].max(rb[1]))) {
+                    found.extend(meeting(shown, first.triangle, second.triangle));
+                }
+            }
+        }
+    }
+}
+
+/// Where two triangles meet, unless they share an edge, lie in one plane, or meet in less than a line.
+fn meeting(shown: &Shown, a: u32, b: u32) -> Option<Meeting> {
+    let vertices = [a, b].map(|t| shown.triangles[t as usize]);
+    if vertices[0].iter().filter(|v| vertices[1].contains(v)).count() > 1 {
+        return None;
+    }
+    debug_assert!(is_live(shown, a) && is_live(shown, b));
+    let corners = [shown.corners_in_view(a), shown.corners_in_view(b)];
+    let tolerance = shown.lens.tolerance;
+    let normal = |c: &[DVec3; 3]| (c[1] - c[0]).cross(c[2] - c[0]).normalize_or_zero();
+    let n = [normal(&corners[0]), normal(&corners[1])];
+    let sides_b = sides(&corners[1], corners[0][0], n[0], tolerance)?;
+    let sides_a = sides(&corners[0], corners[1][0], n[1], tolerance)?;
+    let direction = n[0].cross(n[1]);
+    if direction.length_squared() < PARALLEL * PARALLEL {
+        return None;
+    }
+    let direction = direction.normalize();
+    let mut of_a = cut(&vertices[0], &corners[0], &sides_a, direction)?;
+    let of_b = cut(&vertices[1], &corners[1], &sides_b, direction)?;
+    let along = |p: DVec3| (p - corners[0][0]).dot(direction);
+    if along(of_b[0]) > along(of_a[0]) {
+        of_a[0] = of_b[0];
+    }
+    if along(of_b[1]) < along(of_a[1]) {
+        of_a[1] = of_b[1];
+    }
+    if along(of_a[1]) - along(of_a[0]) <= tolerance {
+        return None;
+    }
+    let passes = passes_through(shown, a, &sides_a, corners[1][0], n[1])
+        && passes_through(shown, b, &sides_b, corners[0][0], n[0]);
+    let kind = if passes { Kind::Intersection } else { Kind::Contact };
+    Some(Meeting { ends: of_a, kind, triangles: [a, b] })
+}
+
+/// On which side of a plane each corner is: a distance, or 0 within the tolerance. `None` if the triangle
+/// does not reach the plane, or lies in it.
+fn sides(
+    corners: &[DVec3; 3],
+    point: DVec3,
+    normal: DVec3,
+    tolerance: f64,
+) -> Option<[f64; 3]> {
+    let sides = corners.map(|c| {
+        let side = normal.dot(c - point);
+        if side.abs() <= tolerance { 0.0 } else { side }
+    });
+    let reaches = sides.iter().any(|&s| s >= 0.0) && sides.iter().any(|&s| s <= 0.0);
+    let lies_in = sides.iter().all(|&s| s == 0.0);
+    (reaches && !lies_in).then_some(sides)
+}
+
+/// The segment in which a triangle cuts a plane, ordered along `direction`; `None` if it is a point.
+fn cut(vertices: &[u32; 3], corners: &[DVec3; 3], sides: &[f64; 3], direction: DVec3) -> Option<[DVec3; 2]> {
+    let mut ends = [DVec3::ZERO; 3];
+    let mut count = 0;
+    for k in 0..3 {
+        let m = (k + 1) % 3;
+        if sides[k] == 0.0 {
+            ends[count] = corners[k];
+            count += 1;
+        } else if sides[k] * sides[m] < 0.0 {
+            // The same arithmetic from both triangles at this edge.
+            let (i, j) = if vertices[k] < vertices[m] { (k, m) } else { (m, k) };
+            ends[count] = corners[i] + (corners[j] - corners[i]) * (sides[i] / (sides[i] - sides[j]));
+            count += 1;
+        }
+    }
+    if count < 2 {
+        return None;
+    }
+    let forward = (ends[1] - ends[0]).dot(direction) >= 0.0;
+    Some(if forward { [ends[0], ends[1]] } else { [ends[1], ends[0]] })
+}
+
+/// Whether the surface of triangle `t` is on both sides of a plane near where they meet: the triangle itself
+/// is, or it has an edge in the plane and its neighbour there is on the other side.
+fn passes_through(shown: &Shown, t: u32, sides: &[f64; 3], point: DVec3, normal: DVec3) -> bool {
+    if sides.iter().any(|&s| s > 0.0) && sides.iter().any(|&s| s < 0.0) {
+        return true;
+    }
+    let Some(k) = (0..3).find(|&k| sides[k] == 0.0 && sides[(k + 1) % 3] == 0.0) else { return false };
+    let solid = &shown.solids[shown.solid_of(t)];
+    if solid.cut.is_some() {
+        return false;
+    }
+    let neighbour = shown.place(solid, solid.topology.neighbours[shown.origin(solid, t) as usize][k]);
+    if neighbour == NONE {
+        return false;
+    }
+    let edge = [0, 1].map(|i| shown.triangles[t as usize][(k + i) % 3]);
+    let other = shown.triangles[neighbour as usize].iter().find(|v| !edge.contains(v));
+    let theirs = other.map_or(0.0, |&v| normal.dot(shown.in_view[v as usize] - point));
+    let ours = sides[(k + 2) % 3];
+    theirs * ours < 0.0 && theirs.abs() > shown.lens.tolerance
+}

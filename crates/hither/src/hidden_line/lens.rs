@@ -1,0 +1,99 @@
+//! From view space to the drawing: where a point is on the paper, and how near.
+//!
+//! A projected point is (x, y, w): x and y in pixels, +y down, and w a depth that is *linear on the paper*
+//! along every line and across every plane, larger nearer: −1/z in perspective, z in a parallel view. All of
+//! hidden-line removal happens in this space, where lines of sight are parallel and planes are planes.
+
+use crate::conventions::{Projection, View};
+use glam::{DVec2, DVec3};
+
+/// A half-space in view space: kept is where `normal · p + offset ≥ 0`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HalfSpace {
+    pub normal: DVec3,
+    pub offset: f64,
+    /// A section plane of the user's: where it cuts, lines and caps are drawn.
+    pub section: bool,
+}
+
+impl HalfSpace {
+    /// Signed distance times the normal's length.
+    pub fn side(&self, p: DVec3) -> f64 {
+        self.normal.dot(p) + self.offset
+    }
+}
+
+/// The arithmetic of a [`View`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lens {
+    perspective: bool,
+    pixels_per_unit: f64,
+    middle: DVec2,
+    /// What differs by less than this, metres, is at the same place.
+    pub tolerance: f64,
+}
+
+/// Surfaces at a flatter angle to the line of sight than this (its sine) are judged as if at this angle.
+const FLATTEST: f64 = 1e-3;
+
+impl Lens {
+    pub fn new(view: &View, tolerance: f64) -> Lens {
+        Lens {
+            perspective: matches!(view.projection, Projection::Perspective { .. }),
+            pixels_per_unit: view.pixels_per_unit(),
+            middle: DVec2::new(f64::from(view.width), f64::from(view.height)) * 0.5,
+            tolerance,
+        }
+    }
+
+    /// (x, y, w) of a point in front of the near plane.
+    pub fn project(&self, p: DVec3) -> DVec3 {
+        let (scale, w) = if self.perspective {
+            let w = -1.0 / p.z;
+            (self.pixels_per_unit * w, w)
+        } else {
+            (self.pixels_per_unit, p.z)
+        };
+        DVec3::new(self.middle.x + p.x * scale, self.middle.y - p.y * scale, w)
+    }
+
+    /// The point in view space that is drawn at (x, y, w).
+    pub fn unproject(&self, s: DVec3) -> DVec3 {
+        let across = DVec2::new(s.x - self.middle.x, self.middle.y - s.y) / self.pixels_per_unit;
+        if self.perspective { across.extend(-1.0) / s.z } else { across.extend(s.z) }
+    }
+
+    /// The largest difference of w, near depth `w`, that any surface calls the same place.
+    pub fn coarse(&self, w: f64) -> f64 {
+        let per_metre = if self.perspective { w * w } else { 1.0 };
+        self.tolerance * per_metre / FLATTEST
+    }
+
+    /// The difference of w at depth `w` that is [`Lens::tolerance`] away from the plane of a triangle with
+    /// these corners in view space.
+    pub fn same_depth(&self, [a, b, c]: [DVec3; 3], w: f64) -> f64 {
+        let n = (b - a).cross(c - a);
+        let length = n.length();
+        // Sine of the angle between the plane and the line of sight, and what a metre along it is in w.
+        let (sine, per_metre) = if self.perspective {
+            (n.dot(a).abs() * w / length, w * w)
+        } else {
+            (n.z.abs() / length, 1.0)
+        };
+        // The comparison also catches a plane that cannot be told, NaN.
+        let sine = if sine > FLATTEST { sine } else { FLATTEST };
+        self.tolerance * per_metre / sine
+    }
+
+    /// Half-spaces that a view shows: beyond the near plane and before the far one.
+    pub fn range(projection: &Projection) -> Vec<HalfSpace> {
+        let near =
+            HalfSpace { normal: DVec3::NEG_Z, offset: -projection.near(), section: false };
+        match *projection {
+            Projection::Perspective { .. } => vec![near],
+            Projection::Orthographic { far, .. } => {
+                vec![near, HalfSpace { normal: DVec3::Z, offset: far, section: false }]
+            }
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! The triangles and vertices of one view, clipped and projected.
+//!
+//! Every instance that may be seen becomes a [`Solid`]: a run of vertices and a run of triangles. One that
+//! no plane cuts keeps its mesh's numbering; one that is cut gets new vertices, each shared by all that meet
+//! at the cut edge, so that neighbours stay neighbours.
+
+use super::lens::{HalfSpace, Lens};
+use super::predicates::orientation;
+use super::topology::{Mix, NONE, Topology};
+use glam::{DAffine3, DVec3};
+use std::collections::HashMap;
+
+/// What became of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fate {
+    /// It may be seen.
+    Live,
+    /// Something nearer covers all of it.
+    Hidden,
+    /// It is outside the picture.
+    Outside,
+    /// It is seen edge-on, or has no area: it hides nothing.
+    EdgeOn,
+}
+
+/// An instance in view.
+#[derive(Debug)]
+pub(super) struct Solid<'p> {
+    pub topology: &'p Topology,
+    /// Number of the instance.
+    pub part: u32,
+    /// Whether the instance keeps angles.
+    pub keeps_angles: bool,
+    pub first_vertex: u32,
+    pub first_triangle: u32,
+    pub triangle_count: u32,
+    /// Of a solid that is cut: what the planes did.
+    pub cut: Option<Cut>,
+}
+
+/// How planes cut an instance.
+#[derive(Debug, Default)]
+pub(super) struct Cut {
+    /// For each of the mesh's triangles, the first of its pieces (relative), or [`NONE`].
+    pub place: Vec<u32>,
+    /// For each piece, the mesh's triangle.
+    pub origin: Vec<u32>,
+    /// Whether the mesh's triangle is whole.
+    pub whole: Vec<bool>,
+    /// The vertex (relative) that replaces the far end of an edge: keyed by its ends, the kept end first.
+    ends: HashMap<(u32, u32), u32, Mix>,
+    /// Which vertices are kept.
+    kept: Vec<bool>,
+}
+
+/// Everything that may be seen, in view space and on the paper.
+#[derive(Debug)]
+pub(super) struct Shown<'p> {
+    pub lens: Lens,
+    pub planes: Vec<HalfSpace>,
+    pub solids: Vec<Solid<'p>>,
+    pub in_view: Vec<DVec3>,
+    pub screen: Vec<DVec3>,
+    pub triangles: Vec<[u32; 3]>,
+    /// The sense of rotation of the projected corners: 1, −1, or 0 for edge-on.
+    pub facing: Vec<i8>,
+    pub fate: Vec<Fate>,
+    /// Lines where section planes cut, between vertices; with the solid and the plane.
+    pub sections: Vec<SectionLine>,
+}
+
+/// A piece of the outline of a cut.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SectionLine {
+    pub solid: u32,
+    pub plane: u32,
+    pub vertices: [u32; 2],
+}
+
+impl<'p> Shown<'p> {
+    pub fn new(lens: Lens, planes: Vec<HalfSpace>) -> Shown<'p> {
+        Shown {
+            lens,
+            planes,
+            solids: Vec::new(),
+            in_view: Vec::new(),
+            screen: Vec::new(),
+            triangles: Vec::new(),
+            facing: Vec::new(),
+            fate: Vec::new(),
+            sections: Vec::new(),
+        }
+    }
+
+    /// Adds an instance; `cut` says whether some plane may cut it.
+    pub fn add(&mut self, topology: &'p Topology, part: u32, view_from_mesh: &DAffine3, cut: bool) {
+        let first_vertex = self.in_view.len() as u32;
+        let first_triangle = self.triangles.len() as u32;
+        self.in_view
+            .extend(topology.positions.iter().map(|p| view_from_mesh.transform_point3(p.as_dvec3())));
+        let cut = if cut { self.clip(topology, first_vertex) } else { None };
+        if cut.is_none() {
+            let global = |v: u32| if v == NONE { NONE } else { v + first_vertex };
+            self.triangles.extend(topology.triangles.iter().map(|t| t.map(global)));
+        }
+        let lens = self.lens;
+        let fresh = &self.in_view[first_vertex as usize..];
+        self.screen.extend(fresh.iter().map(|&p| lens.project(p)));
+        for t in &self.triangles[first_triangle as usize..] {
+            let facing = if t[0] == NONE { 0 } else { orientation(t.map(|v| self.screen[v as usize])) };
+            self.facing.push(facing);
+            self.fate.push(if facing == 0 { Fate::EdgeOn } else { Fate::Live });
+        }
+        self.solids.push(Solid {
+            topology,
+            part,
+            keeps_angles: keeps_angles(view_from_mesh),
+            first_vertex,
+            first_triangle,
+            triangle_count: self.triangles.len() as u32 - first_triangle,
+            cut,
+        });
+    }
+
+    /// Clips all triangles of the mesh; `None` if nothing is cut.
+    fn clip(&mut self, topology: &Topology, first_vertex: u32) -> Option<Cut> {
+        let planes = std::mem::take(&mut self.planes);
+        let inside = |p: &DVec3| planes.iter().all(|plane| plane.side(*p) >= 0.0);
+        let kept: Vec<bool> = self.in_view[first_vertex as usize..].iter().map(inside).collect();
+        if kept.iter().all(|&k| k) {
+            self.planes = planes;
+            return None;
+        }
+        let mut cut = Cut { kept, ..Cut::default() };
+        for (i, t) in topology.triangles.iter().enumerate() {
+            let whole = t[0] != NONE && t.iter().all(|&v| cut.kept[v as usize]);
+            cut.whole.push(whole);
+            cut.place.push(NONE);
+            if t[0] == NONE {
+                continue;
+            }
+            let mut polygon: Vec<u32> = t.to_vec();
+            if !whole {
+                for (k, plane) in planes.iter().enumerate() {
+                    polygon = self.clip_polygon(&mut cut, first_vertex, &polygon, plane, k as u32);
+                }
+            }
+            if polygon.len() >= 3 {
+                cut.place[i] = cut.origin.len() as u32;
+                for k in 1..polygon.len() - 1 {
+                    let corners = [polygon[0], polygon[k], polygon[k + 1]];
+                    self.triangles.push(corners.map(|v| v + first_vertex));
+                    cut.origin.push(i as u32);
+                }
+            }
+        }
+        // Vertices that are cut away stay in the list, unused; project() must not see them behind the eye.
+        for (v, &kept) in cut.kept.iter().enumerate() {
+            if !kept && v < topology.positions.len() {
+                self.in_view[first_vertex as usize + v] = DVec3::NEG_Z;
+            }
+        }
+        self.planes = planes;
+        Some(cut)
+    }
+
+    /// What is left of a polygon on the kept side of a plane; on the way, the outline of the cut.
+    fn clip_polygon(
+        &mut self,
+        cut: &mut Cut,
+        first: u32,
+        polygon: &[u32],
+        plane: &HalfSpace,
+        number: u32,
+    ) -> Vec<u32> {
+        let mut result = Vec::with_capacity(polygon.len() + 1);
+        let mut on_plane = Vec::new();
+        let mut outside = false;
+        for (i, &a) in polygon.iter().enumerate() {
+            let b = polygon[(i + 1) % polygon.len()];
+            let side = |v: u32| plane.side(self.in_view[(v + first) as usize]);
+            let (sa, sb) = (side(a), side(b));
+            outside |= sa < 0.0;
+            if sa < 0.0 {
+                cut.kept[a as usize] = false;
+            }
+            if sa >= 0.0 {
+                result.push(a);
+                if sa == 0.0 {
+                    on_plane.push(a);
+                }
+            }
+            if (sa < 0.0 && sb > 0.0) || (sa > 0.0 && sb < 0.0) {
+                let v = self.crossing(cut, first, a, b, plane);
+                result.push(v);
+                on_plane.push(v);
+            }
+        }
+        if plane.section && outside && on_plane.len() == 2 {
+            let vertices = [on_plane[0] + first, on_plane[1] + first];
+            let solid = self.solids.len() as u32;
+            self.sections.push(SectionLine { solid, plane: number, vertices });
+        }
+        result
+    }
+
+    /// The vertex where a plane cuts the edge between two vertices; the same for all that share it.
+    fn crossing(&mut self, cut: &mut Cut, first: u32, a: u32, b: u32, plane: &HalfSpace) -> u32 {
+        let (low, high) = (a.min(b), a.max(b));
+        let (p, q) = (self.in_view[(low + first) as usize], self.in_view[(high + first) as usize]);
+        let (sp, sq) = (plane.side(p), plane.side(q));
+        let (kept, lost) = if sp >= 0.0 { (low, high) } else { (high, low) };
+        if let Some(&known) = cut.ends.get(&(kept, lost)) {
+            return known;
+        }
+        let v = (self.in_view.len() - first as usize) as u32;
+        self.in_view.push(p + (q - p) * (sp / (sp - sq)));
+        cut.kept.push(true);
+        cut.ends.insert((kept, lost), v);
+        v
+    }
+
+    /// What is left of a mesh's edge, as vertices; `None` if the planes left nothing of it.
+    pub fn edge(&self, solid: &Solid, [a, b]: [u32; 2]) -> Option<[u32; 2]> {
+        let first = solid.first_vertex;
+        let Some(cut) = &solid.cut else { return Some([a + first, b + first]) };
+        let (mut ends, kept) = ([a, b], [cut.kept[a as usize], cut.kept[b as usize]]);
+        if kept == [true, true] {
+            return Some([a + first, b + first]);
+        }
+        // An end moves to where a plane cut the edge, perhaps several times, as the triangles' corners did.
+        loop {
+            let mut moved = false;
+            for k in 0..2 {
+                if let Some(&v) = cut.ends.get(&(ends[1 - k], ends[k])) {
+                    ends[k] = v;
+                    moved = true;
+                }
+            }
+            if !moved {
+                break;
+            }
+        }
+        let kept = ends.iter().all(|&v| cut.kept[v as usize]);
+        (kept && ends[0] != ends[1]).then(|| ends.map(|v| v + first))
+    }
+
+    /// The triangle of the view that stands for a mesh's triangle; [`NONE`] if it is cut away.
+    pub fn place(&self, solid: &Solid, triangle: u32) -> u32 {
+        if triangle == NONE {
+            return NONE;
+        }
+        match &solid.cut {
+            None => solid.first_triangle + triangle,
+            Some(cut) => match cut.place[triangle as usize] {
+                NONE => NONE,
+                at => solid.first_triangle + at,
+            },
+        }
+    }
+
+    /// Whether no plane cuts a mesh's triangle.
+    pub fn is_whole(&self, solid: &Solid, triangle: u32) -> bool {
+        solid.cut.as_ref().is_none_or(|cut| cut.whole[triangle as usize])
+    }
+
+    /// The mesh's triangle behind a triangle of the view.
+    pub fn origin(&self, solid: &Solid, triangle: u32) -> u32 {
+        let at = triangle - solid.first_triangle;
+        solid.cut.as_ref().map_or(at, |cut| cut.origin[at as usize])
+    }
+
+    /// The solid that a triangle belongs to.
+    pub fn solid_of(&self, triangle: u32) -> usize {
+        self.solids.partition_point(|s| s.first_triangle <= triangle) - 1
+    }
+
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].map(|v| self.screen[v as usize])
+    }
+
+    pub fn corners_in_view(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].map(|v| self.in_view[v as usize])
+    }
+}
+
+/// Whether a map is a rotation, a reflection and one scale.
+fn keeps_angles(map: &DAffine3) -> bool {
+    let m = map.matrix3;
+    let squares = [m.x_axis.length_squared(), m.y_axis.length_squared(), m.z_axis.length_squared()];
+    let most = squares[0].max(squares[1]).max(squares[2]);
+    let slack = most * 1e-6;
+    squares.iter().all(|s| most - s <= slack)
+        && [m.x_axis.dot(m.y_axis), m.y_axis.dot(m.z_axis), m.z_axis.dot(m.x_axis)]
+            .iter()
+            .all(|d| d.abs() <= slack)
+}

@@ -1,0 +1,266 @@
+//! Whole drawings against dense sampling by rays, and what must not change a drawing.
+
+mod scenes;
+
+use super::{Drawing, Kinds, LineOptions, Preparation, PrepareOptions};
+use crate::conventions::View;
+use crate::reference::lines::{Line, LineOracle, Verdict};
+use crate::reference::trouble;
+use crate::scene::Scene;
+use glam::DVec2;
+
+/// A sample is drawn if a stroke passes this near, pixels.
+const NEAR_PX: f64 = 2e-3;
+
+/// Strokes by cell, to ask what is drawn at a place.
+struct Paper<'a> {
+    drawing: &'a Drawing,
+    cells: std::collections::HashMap<[i64; 2], Vec<([DVec2; 2], u32)>>,
+}
+
+impl Paper<'_> {
+    fn new(drawing: &Drawing) -> Paper<'_> {
+        let mut paper = Paper { drawing, cells: Default::default() };
+        for s in &drawing.strokes {
+            for p in drawing.points_of(s).windows(2) {
+                let steps = (p[0].distance(p[1]) * 4.0).ceil().max(1.0) as i64;
+                let mut last = None;
+                for i in 0..=steps {
+                    let cell = Self::cell(p[0].lerp(p[1], i as f64 / steps as f64));
+                    if last != Some(cell) {
+                        paper.cells.entry(cell).or_default().push(([p[0], p[1]], s.covers));
+                        last = Some(cell);
+                    }
+                }
+            }
+        }
+        paper
+    }
+
+    fn cell(p: DVec2) -> [i64; 2] {
+        [p.x.floor() as i64, p.y.floor() as i64]
+    }
+
+    /// Covers of the strokes that pass near `p` in about the direction `d`.
+    fn at(&self, p: DVec2, d: DVec2) -> Vec<u32> {
+        let [x, y] = Self::cell(p);
+        let mut found = Vec::new();
+        for cell in (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| [x, y])) {
+            for ([a, b], covers) in self.cells.get(&cell).into_iter().flatten() {
+                let step = *b - *a;
+                let length = step.length();
+                let along = (p - *a).dot(step) / length;
+                let near = (p - *a).perp_dot(step).abs() / length <= NEAR_PX;
+                let parallel = d.perp_dot(step).abs() <= 0.05 * length * d.length() || length.min(d.length()) < 0.05;
+                if near && parallel && along >= -NEAR_PX && along <= length + NEAR_PX {
+                    found.push(*covers);
+                }
+            }
+        }
+        found
+    }
+}
+
+#[derive(Default, Debug)]
+struct Score {
+    right: usize,
+    unsure: usize,
+    wrong: Vec<String>,
+}
+
+const SAMPLES: usize = 23;
+
+/// Every sample of every line against the drawing.
+fn check_lines(oracle: &LineOracle, lines: &[Line], paper: &Paper, score: &mut Score) {
+    let (w, h) = (paper.drawing.width, paper.drawing.height);
+    for line in lines {
+        let [a, b] = line.ends.map(|e| oracle.on_paper(e));
+        if a.distance(b) < 1e-3 {
+            continue;
+        }
+        for i in 0..SAMPLES {
+            let u = (i as f64 + 0.37) / SAMPLES as f64;
+            let p = oracle.on_paper(line.ends[0].lerp(line.ends[1], u));
+            if p.x < 0.01 || p.y < 0.01 || p.x > w - 0.01 || p.y > h - 0.01 {
+                continue;
+            }
+            let drawn = paper.at(p, b - a).contains(&0);
+            match oracle.look(line, u) {
+                Verdict::Unsure => score.unsure += 1,
+                Verdict::Visible if !drawn => score.wrong.push(format!("missing at {p}: {line:?} {u}")),
+                // Something visible may be drawn at the same place; the other direction tells.
+                _ => score.right += 1,
+            }
+        }
+    }
+}
+
+/// Every sample of every visible stroke must lie on a line that is seen there.
+fn check_strokes(oracle: &LineOracle, lines: &[Line], drawing: &Drawing, score: &mut Score) {
+    let ends: Vec<[DVec2; 2]> = lines.iter().map(|l| l.ends.map(|e| oracle.on_paper(e))).collect();
+    for s in drawing.strokes.iter().filter(|s| s.covers == 0) {
+        for w in drawing.points_of(s).windows(2) {
+            for i in 0..5 {
+                let p = w[0].lerp(w[1], (f64::from(i) + 0.41) / 5.0);
+                let mut verdicts = Vec::new();
+                for (line, [a, b]) in lines.iter().zip(&ends) {
+                    let step = *b - *a;
+                    let t = (p - *a).dot(step) / step.length_squared();
+                    if !(-1e-6..=1.0 + 1e-6).contains(&t) || (p - *a).perp_dot(step).abs() > NEAR_PX * step.length() {
+                        continue;
+                    }
+                    verdicts.push(oracle.look(line, along(oracle, line, t.clamp(0.0, 1.0))));
+                }
+                if verdicts.contains(&Verdict::Visible) {
+                    score.right += 1;
+                } else if verdicts.contains(&Verdict::Unsure) {
+                    score.unsure += 1;
+                } else {
+                    score.wrong.push(format!("{:?} of part {} drawn at {p}: {verdicts:?}", s.kind, s.part));
+                }
+            }
+        }
+    }
+}
+
+/// The place on a line in space that is drawn at `t` of it on the paper.
+fn along(oracle: &LineOracle, line: &Line, t: f64) -> f64 {
+    let [a, b] = line.ends;
+    let (pa, pb) = (oracle.on_paper(a), oracle.on_paper(b));
+    let target = pa.lerp(pb, t);
+    // In perspective depth is not linear on the paper: solve for the place by its position along the line.
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..60 {
+        let mid = 0.5 * (low + high);
+        let here = oracle.on_paper(a.lerp(b, mid));
+        if (here - pa).dot(pb - pa) < (target - pa).dot(pb - pa) { low = mid } else { high = mid }
+    }
+    0.5 * (low + high)
+}
+
+fn all_lines() -> LineOptions {
+    LineOptions { crease_angle: 0.0, threads: 1, ..LineOptions::default() }
+}
+
+fn judge(scene: &Scene, view: &View) -> Score {
+    let preparation = Preparation::new(scene, &PrepareOptions::default());
+    let drawing = preparation.draw(view, &all_lines()).unwrap();
+    let oracle = LineOracle::new(scene, view, preparation.tolerance());
+    let mut lines = oracle.edges(super::edges::FLAT);
+    lines.extend(oracle.meetings());
+    let mut score = Score::default();
+    check_lines(&oracle, &lines, &Paper::new(&drawing), &mut score);
+    check_strokes(&oracle, &lines, &drawing, &mut score);
+    score
+}
+
+#[test]
+fn drawings_agree_with_dense_sampling_on_troublesome_scenes() {
+    let (mut right, mut unsure) = (0, 0);
+    let mut wrong = Vec::new();
+    for seed in 0..60 {
+        let scene = trouble::scene(seed);
+        if scene.bounds().is_none_or(|b| b.size().max_element() > 200.0) || scene.instanced_triangle_count() > 600 {
+            continue;
+        }
+        let mut view = trouble::view(seed);
+        (view.width, view.height) = (view.width * 10, view.height * 10);
+        let score = judge(&scene, &view);
+        right += score.right;
+        unsure += score.unsure;
+        wrong.extend(score.wrong.into_iter().map(|w| format!("seed {seed}: {w}")));
+    }
+    println!("{right} right, {unsure} unsure, {} wrong", wrong.len());
+    assert!(wrong.is_empty(), "{} wrong of {right}; {:#?}", wrong.len(), &wrong[..wrong.len().min(12)]);
+    assert!(unsure * 20 < right, "{unsure} unsure, {right} right");
+}
+
+#[test]
+fn drawings_agree_with_dense_sampling_on_bodies_that_touch() {
+    let (mut right, mut unsure) = (0, 0);
+    let mut wrong = Vec::new();
+    for (name, scene) in scenes::bodies() {
+        for (v, view) in scenes::views(&scene).into_iter().enumerate() {
+            let score = judge(&scene, &view);
+            right += score.right;
+            unsure += score.unsure;
+            wrong.extend(score.wrong.into_iter().map(|w| format!("{name} {v}: {w}")));
+        }
+    }
+    println!("{right} right, {unsure} unsure, {} wrong", wrong.len());
+    assert!(wrong.is_empty(), "{} wrong of {right}; {:#?}", wrong.len(), &wrong[..wrong.len().min(12)]);
+    assert!(unsure * 4 < right, "{unsure} unsure, {right} right");
+}
+
+#[test]
+fn covers_are_what_rays_count() {
+    let (mut right, mut wrong) = (0, Vec::new());
+    for (name, scene) in scenes::bodies() {
+        for view in scenes::views(&scene) {
+            let preparation = Preparation::new(&scene, &PrepareOptions::default());
+            let options = LineOptions { hidden: true, ..all_lines() };
+            let drawing = preparation.draw(&view, &options).unwrap();
+            let oracle = LineOracle::new(&scene, &view, preparation.tolerance());
+            let paper = Paper::new(&drawing);
+            for line in oracle.edges(super::edges::FLAT) {
+                let [a, b] = line.ends.map(|e| oracle.on_paper(e));
+                for i in 0..9 {
+                    let u = (f64::from(i) + 0.37) / 9.0;
+                    let p = oracle.on_paper(line.ends[0].lerp(line.ends[1], u));
+                    if p.min_element() < 0.01 || p.x > drawing.width - 0.01 || p.y > drawing.height - 0.01 {
+                        continue;
+                    }
+                    let covers = match oracle.look(&line, u) {
+                        Verdict::Visible => 0,
+                        Verdict::Hidden(n) => n,
+                        Verdict::Unsure => continue,
+                    };
+                    // A line with fewer covers may be drawn in its stead.
+                    if a.distance(b) > 1e-3 && !paper.at(p, b - a).iter().any(|&c| c <= covers) {
+                        wrong.push(format!("{name} at {p}: {covers} but {:?}", paper.at(p, b - a)));
+                    }
+                    right += 1;
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} wrong of {right}; {:#?}", wrong.len(), &wrong[..wrong.len().min(12)]);
+}
+
+#[test]
+fn threads_and_the_order_of_parts_do_not_change_the_drawing() {
+    for (name, scene) in scenes::bodies() {
+        let view = scenes::views(&scene)[0];
+        let draw = |scene: &Scene, threads| {
+            let preparation = Preparation::new(scene, &PrepareOptions::default());
+            preparation.draw(&view, &LineOptions { threads, ..all_lines() }).unwrap()
+        };
+        let one = draw(&scene, 1);
+        let two = draw(&scene, 2);
+        assert_eq!(one.strokes, two.strokes, "{name}");
+        assert_eq!(one.points, two.points, "{name}");
+        let mut turned = scene.clone();
+        turned.groups[0].nodes.reverse();
+        for mesh in &mut turned.meshes {
+            mesh.triangles.reverse();
+        }
+        let turned = draw(&turned, 1);
+        let difference = (one.visible_length() - turned.visible_length()).abs();
+        assert!(difference < 1e-4 * one.visible_length().max(1.0), "{name}: {difference}");
+    }
+}
+
+#[test]
+fn kinds_can_be_asked_for_one_by_one() {
+    let (_, scene) = scenes::bodies().remove(0);
+    let view = scenes::views(&scene)[0];
+    let preparation = Preparation::new(&scene, &PrepareOptions::default());
+    let draw = |kinds| preparation.draw(&view, &LineOptions { kinds, ..all_lines() }).unwrap();
+    assert!(draw(Kinds::NONE).strokes.is_empty());
+    let lines = draw(Kinds { silhouette: true, ..Kinds::NONE });
+    assert!(!lines.strokes.is_empty());
+    assert!(lines.strokes.iter().all(|s| s.kind == super::Kind::Silhouette));
+    let lines = draw(Kinds { intersection: true, ..Kinds::NONE });
+    assert!(lines.strokes.iter().all(|s| s.kind == super::Kind::Intersection));
+    assert!(!lines.strokes.is_empty());
+}

@@ -1,0 +1,279 @@
+//! What does not change with the view: a mesh's edges, and which triangles meet at each.
+//!
+//! Vertices with the same position are one vertex here, whatever their normals and colours, so that a seam
+//! of texture coordinates is no boundary. Triangles without area are left out: they show nothing and hide
+//! nothing.
+
+use crate::scene::{AlphaMode, Mesh, Scene};
+use glam::{DVec3, Vec3};
+use std::collections::HashMap;
+
+/// No triangle, or no vertex.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// What an edge is, whatever the view.
+pub(super) mod trait_of {
+    /// More than two triangles meet here.
+    pub const NON_MANIFOLD: u8 = 1;
+    /// The two triangles have different materials.
+    pub const BORDER: u8 = 2;
+    /// The two triangles wind in opposite senses: what is front of one is back of the other.
+    pub const FLIPPED: u8 = 4;
+    /// The user asked for it.
+    pub const MARKED: u8 = 8;
+}
+
+/// Two vertices and the triangles between them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edge {
+    /// The smaller vertex first.
+    pub vertices: [u32; 2],
+    /// The triangles on both sides; the second is [`NONE`] at a boundary. Of a non-manifold edge, two.
+    pub triangles: [u32; 2],
+    /// How much the surface bends here, 1 − cos of the angle between the normals, in the mesh's own space:
+    /// 0 is flat, 2 is folded back.
+    pub bend: f32,
+    /// Bits of [`trait_of`].
+    pub traits: u8,
+}
+
+/// A mesh as drawings need it.
+#[derive(Clone, Debug)]
+pub(super) struct Topology {
+    /// Vertices; no two are the same point.
+    pub positions: Vec<Vec3>,
+    /// Corners of each of the mesh's triangles, numbered as the mesh numbers them; [`NONE`] thrice for one
+    /// without area.
+    pub triangles: Vec<[u32; 3]>,
+    /// The triangle across the edge from corner k to k + 1; [`NONE`] at a boundary or non-manifold edge.
+    pub neighbours: Vec<[u32; 3]>,
+    /// For each triangle, bit k is set where the neighbour at k winds in the opposite sense.
+    pub flips: Vec<u8>,
+    /// All edges, by their smaller vertex.
+    pub edges: Vec<Edge>,
+    /// Triangles that hide nothing if blended materials do not; empty where there are none.
+    pub see_through: Vec<bool>,
+}
+
+impl Topology {
+    /// Finds the edges of `mesh`. `marked` are pairs of its vertices. Cost: linear, and hashing of the
+    /// positions where some occur twice.
+    pub fn of(scene: &Scene, mesh: &Mesh, marked: &[[u32; 2]]) -> Topology {
+        let (positions, name) = weld(&mesh.positions);
+        let corner = |v: u32| name.as_ref().map_or(v, |n| n[v as usize]);
+        let triangles: Vec<[u32; 3]> =
+            mesh.triangles.iter().map(|t| solid(t.map(corner), &positions)).collect();
+        let mut topology = Topology {
+            neighbours: vec![[NONE; 3]; triangles.len()],
+            flips: vec![0; triangles.len()],
+            edges: Vec::new(),
+            see_through: see_through(scene, mesh),
+            positions,
+            triangles,
+        };
+        let materials = materials(mesh);
+        topology.find_edges(&materials);
+        if !marked.is_empty() {
+            let wanted: std::collections::HashSet<[u32; 2]> =
+                marked.iter().map(|&[a, b]| ordered(corner(a), corner(b))).collect();
+            for edge in topology.edges.iter_mut().filter(|e| wanted.contains(&e.vertices)) {
+                edge.traits |= trait_of::MARKED;
+            }
+        }
+        topology
+    }
+
+    /// Half-edges sorted by their smaller vertex (counting), then by the larger: runs are edges.
+    fn find_edges(&mut self, materials: &[u32]) {
+        let mut starts = vec![0u32; self.positions.len() + 1];
+        let sides = |t: &[u32; 3]| [ordered(t[0], t[1]), ordered(t[1], t[2]), ordered(t[2], t[0])];
+        for t in self.triangles.iter().filter(|t| t[0] != NONE) {
+            for [low, _] in sides(t) {
+                starts[low as usize + 1] += 1;
+            }
+        }
+        for v in 1..starts.len() {
+            starts[v] += starts[v - 1];
+        }
+        let mut halves = vec![(0u32, 0u32); starts[self.positions.len()] as usize];
+        let mut next = starts.clone();
+        for (i, t) in self.triangles.iter().enumerate().filter(|(_, t)| t[0] != NONE) {
+            for (k, [low, high]) in sides(t).into_iter().enumerate() {
+                let at = &mut next[low as usize];
+                halves[*at as usize] = (high, (i * 3 + k) as u32);
+                *at += 1;
+            }
+        }
+        self.edges.reserve_exact(halves.len() / 2 + halves.len() / 16);
+        let normals: Vec<Vec3> = self.triangles.iter().map(|t| self.normal(t).as_vec3()).collect();
+        for low in 0..self.positions.len() {
+            let run = &mut halves[starts[low] as usize..starts[low + 1] as usize];
+            run.sort_unstable();
+            let mut rest = &run[..];
+            while let Some(&(high, _)) = rest.first() {
+                let count = rest.iter().take_while(|h| h.0 == high).count();
+                let (same, others) = rest.split_at(count);
+                self.add_edge([low as u32, high], same, &normals, materials);
+                rest = others;
+            }
+        }
+    }
+
+    fn add_edge(&mut self, vertices: [u32; 2], halves: &[(u32, u32)], normals: &[Vec3], materials: &[u32]) {
+        let triangle = |at: usize| halves.get(at).map_or(NONE, |h| h.1 / 3);
+        let (a, b) = (triangle(0), triangle(1));
+        let mut edge = Edge { vertices, triangles: [a, b], bend: 2.0, traits: 0 };
+        if halves.len() > 2 {
+            edge.traits |= trait_of::NON_MANIFOLD;
+        } else if b != NONE {
+            let (ka, kb) = (halves[0].1 % 3, halves[1].1 % 3);
+            let forward = |t: u32, k: u32| self.triangles[t as usize][k as usize] == vertices[0];
+            let flipped = forward(a, ka) == forward(b, kb);
+            let sign = if flipped { -1.0 } else { 1.0 };
+            // From the difference, not from the product: that would lose small angles.
+            edge.bend = (normals[a as usize] - sign * normals[b as usize]).length_squared() * 0.5;
+            edge.traits |= if flipped { trait_of::FLIPPED } else { 0 };
+            if !materials.is_empty() && materials[a as usize] != materials[b as usize] {
+                edge.traits |= trait_of::BORDER;
+            }
+            self.neighbours[a as usize][ka as usize] = b;
+            self.neighbours[b as usize][kb as usize] = a;
+            self.flips[a as usize] |= u8::from(flipped) << ka;
+            self.flips[b as usize] |= u8::from(flipped) << kb;
+        }
+        self.edges.push(edge);
+    }
+
+    /// Unit normal of a triangle; zero for one without area.
+    fn normal(&self, t: &[u32; 3]) -> DVec3 {
+        if t[0] == NONE {
+            return DVec3::ZERO;
+        }
+        let [a, b, c] = t.map(|v| self.positions[v as usize].as_dvec3());
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+}
+
+fn ordered(a: u32, b: u32) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// The corners, or [`NONE`] where they lie on a line or two are the same.
+fn solid(t: [u32; 3], positions: &[Vec3]) -> [u32; 3] {
+    let [a, b, c] = t.map(|v| positions[v as usize].as_dvec3());
+    let flat = (b - a).cross(c - a) == DVec3::ZERO;
+    if flat || t[0] == t[1] || t[1] == t[2] || t[2] == t[0] { [NONE; 3] } else { t }
+}
+
+/// Distinct positions, and for each vertex its position's number; `None` where all are distinct.
+fn weld(positions: &[Vec3]) -> (Vec<Vec3>, Option<Vec<u32>>) {
+    let key = |p: &Vec3| (*p + 0.0).to_array().map(f32::to_bits);
+    // Sorting what is distinct anyway would cost more than drawing it: look for twins in a table of
+    // fingerprints first.
+    let mut seen: HashMap<[u32; 3], u32, Mix> = HashMap::with_capacity_and_hasher(positions.len(), Mix);
+    let mut distinct = Vec::with_capacity(positions.len());
+    let mut name = Vec::with_capacity(positions.len());
+    for p in positions {
+        let fresh = distinct.len() as u32;
+        let found = *seen.entry(key(p)).or_insert(fresh);
+        if found == fresh {
+            distinct.push(*p + 0.0);
+        }
+        name.push(found);
+    }
+    let changed = distinct.len() != positions.len();
+    (distinct, changed.then_some(name))
+}
+
+/// A fast hash for coordinates. A file made to collide slows itself down, and nothing else.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Mix;
+
+/// State of [`Mix`].
+pub(super) struct Mixer(u64);
+
+impl std::hash::BuildHasher for Mix {
+    type Hasher = Mixer;
+    fn build_hasher(&self) -> Mixer {
+        Mixer(0)
+    }
+}
+
+impl std::hash::Hasher for Mixer {
+    fn write(&mut self, bytes: &[u8]) {
+        for chunk in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..chunk.len()].copy_from_slice(chunk);
+            self.write_u64(u64::from_le_bytes(word));
+        }
+    }
+    fn write_u32(&mut self, n: u32) {
+        self.write_u64(u64::from(n));
+    }
+    fn write_u64(&mut self, n: u64) {
+        self.0 = (self.0.rotate_left(23) ^ n).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+    fn write_usize(&mut self, n: usize) {
+        self.write_u64(n as u64);
+    }
+    fn finish(&self) -> u64 {
+        self.0 ^ (self.0 >> 29)
+    }
+}
+
+/// Material of each triangle; empty where all have the same.
+fn materials(mesh: &Mesh) -> Vec<u32> {
+    let of = |p: &crate::scene::Primitive| p.material.unwrap_or(NONE);
+    let mut kinds = mesh.primitives.iter().map(of);
+    let first = kinds.next();
+    if kinds.all(|m| Some(m) == first) {
+        return Vec::new();
+    }
+    mesh.primitives.iter().flat_map(|p| p.triangles.clone().map(move |_| of(p))).collect()
+}
+
+fn see_through(scene: &Scene, mesh: &Mesh) -> Vec<bool> {
+    let blended = |m: Option<u32>| m.is_some_and(|m| scene.materials[m as usize].alpha == AlphaMode::Blend);
+    if !mesh.primitives.iter().any(|p| blended(p.material)) {
+        return Vec::new();
+    }
+    mesh.primitives.iter().flat_map(|p| p.triangles.clone().map(|_| blended(p.material))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Primitive;
+
+    fn topology(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Topology {
+        let mesh = Mesh {
+            positions: positions.iter().map(|&p| p.into()).collect(),
+            triangles: triangles.to_vec(),
+            primitives: vec![Primitive { triangles: 0..triangles.len() as u32, material: None }],
+            ..Mesh::default()
+        };
+        Topology::of(&Scene::new("t"), &mesh, &[[0, 1]])
+    }
+
+    #[test]
+    fn a_split_square_has_five_edges_one_of_them_flat() {
+        // The second triangle repeats its corners and winds the other way.
+        let at = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
+        let t = topology(&at, &[[0, 1, 2], [5, 4, 3]]);
+        assert_eq!((t.positions.len(), t.edges.len()), (4, 5));
+        let inner: Vec<&Edge> = t.edges.iter().filter(|e| e.triangles[1] != NONE).collect();
+        assert_eq!(inner.len(), 1);
+        assert_eq!(inner[0].bend, 0.0);
+        assert_eq!(inner[0].traits & trait_of::FLIPPED, trait_of::FLIPPED);
+        assert_eq!(t.edges.iter().filter(|e| e.traits & trait_of::MARKED != 0).count(), 1);
+    }
+
+    #[test]
+    fn three_triangles_at_an_edge_are_no_neighbours() {
+        let at = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., -1., 0.], [0., 0., 1.]];
+        let t = topology(&at, &[[0, 1, 2], [0, 1, 3], [0, 1, 4], [0, 0, 1]]);
+        assert!(t.neighbours.iter().all(|n| *n == [NONE; 3]));
+        assert_eq!(t.edges.iter().filter(|e| e.traits & trait_of::NON_MANIFOLD != 0).count(), 1);
+        assert_eq!(t.triangles[3], [NONE; 3]);
+    }
+}
