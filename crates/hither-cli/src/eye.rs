@@ -12,7 +12,7 @@ use hither::geometry::Aabb;
 /// Field of view where neither the user nor a camera gives one, degrees.
 const DEFAULT_FOV: f64 = 45.0;
 /// From where a scene without cameras is looked at.
-const THREE_QUARTERS: DVec3 = DVec3::new(0.55, 0.45, 0.7);
+pub const THREE_QUARTERS: DVec3 = DVec3::new(0.55, 0.45, 0.7);
 /// How much room is left around a scene that is framed.
 const MARGIN: f64 = 1.05;
 

@@ -215,7 +215,8 @@ pub fn color(text: &str) -> Result<[u8; 4], String> {
     }
 }
 
-fn number(text: &str) -> Option<f64> {
+/// A finite number.
+pub fn number(text: &str) -> Option<f64> {
     text.trim().parse::<f64>().ok().filter(|x| x.is_finite())
 }
 

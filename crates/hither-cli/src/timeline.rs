@@ -72,7 +72,12 @@ impl Timeline {
 
     /// Poses a scene that is not indexed yet for the first picture.
     pub fn pose_first(&self, scene: &mut Scene) {
-        if let (Some(animation), Some(time)) = (self.animation, self.time(self.frames.start)) {
+        self.pose_scene(scene, self.frames.start);
+    }
+
+    /// Poses a scene that is not indexed for one of the pictures.
+    pub fn pose_scene(&self, scene: &mut Scene, frame: u32) {
+        if let (Some(animation), Some(time)) = (self.animation, self.time(frame)) {
             scene.pose(animation, time);
         }
     }

@@ -7,6 +7,7 @@
 
 mod atomic;
 mod companions;
+mod drawing;
 mod error;
 mod exr;
 mod format;
@@ -24,6 +25,7 @@ mod weld;
 
 pub use atomic::{check_writable, write_whole};
 pub use companions::{Companions, ModelFolder};
+pub use drawing::{Sheet, SheetView, Unit, write_drawing_json, write_dxf, write_svg};
 pub use error::{Diagnostic, Error, Loaded};
 pub use exr::{ExrImage, write_exr};
 pub use gltf::write_glb;

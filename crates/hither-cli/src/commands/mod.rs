@@ -3,6 +3,7 @@
 mod bench;
 mod demo;
 mod info;
+mod lines;
 mod render;
 mod report;
 mod world;
@@ -19,6 +20,8 @@ pub enum Command {
     World(world::Arguments),
     /// What does it look like?
     Render(Box<render::Arguments>),
+    /// As a drawing
+    Lines(Box<lines::Arguments>),
     /// How fast, against what?
     Bench(bench::Arguments),
 }
@@ -29,6 +32,7 @@ pub fn run(command: Option<Command>) -> Result<(), Failure> {
         Some(Command::Info(arguments)) => info::run(&arguments),
         Some(Command::World(arguments)) => world::run(&arguments),
         Some(Command::Render(arguments)) => render::run(&arguments),
+        Some(Command::Lines(arguments)) => lines::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         None => demo::run(),
     }

@@ -91,7 +91,7 @@ impl Preparation {
         counters.visible_segments = pieces.iter().filter(|p| p.covers == 0).count() as u64;
         coincident::draw_once(&mut pieces);
         let (points, strokes) = strokes::join(pieces);
-        Drawing { width: picture.x, height: picture.y, points, strokes, counters }
+        Drawing { width: picture.x, height: picture.y, points, strokes, faces: Vec::new(), counters }
     }
 
     /// Instances that are in the view, nearest first.

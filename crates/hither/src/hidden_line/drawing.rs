@@ -65,6 +65,30 @@ pub struct Stroke {
     pub points: Range<u32>,
 }
 
+/// A visible region of one flat face, as a polygon with holes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Face {
+    /// The instance that it belongs to.
+    pub part: u32,
+    /// A triangle of the instance's mesh in whose plane it is.
+    pub triangle: u32,
+    /// sRGB.
+    pub color: [u8; 3],
+    /// The outline and then the holes, pixels, +y down; closed, without repeating the first point.
+    pub contours: Vec<Vec<DVec2>>,
+}
+
+impl Face {
+    /// Area without the holes, square pixels.
+    pub fn area(&self) -> f64 {
+        let twice = |c: &Vec<DVec2>| {
+            (0..c.len()).map(|i| c[i].perp_dot(c[(i + 1) % c.len()])).sum::<f64>().abs()
+        };
+        let mut areas = self.contours.iter().map(twice);
+        areas.next().map_or(0.0, |outer| (outer - areas.sum::<f64>()) * 0.5)
+    }
+}
+
 /// What was done for a drawing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
@@ -96,6 +120,8 @@ pub struct Drawing {
     /// What to draw, grouped by part, then visible before hidden, then by kind; within a group in an order
     /// with short ways between strokes.
     pub strokes: Vec<Stroke>,
+    /// Visible faces, by part; empty where they were not asked for.
+    pub faces: Vec<Face>,
     /// What was done.
     pub counters: Counters,
 }

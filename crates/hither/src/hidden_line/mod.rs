@@ -34,11 +34,12 @@ mod shown;
 mod strokes;
 mod topology;
 mod trace;
+pub mod views;
 
 #[cfg(test)]
 mod tests;
 
-pub use drawing::{Counters, Drawing, Kind, Stroke};
+pub use drawing::{Counters, Drawing, Face, Kind, Stroke};
 
 use crate::geometry::Aabb;
 use crate::scene::Scene;
