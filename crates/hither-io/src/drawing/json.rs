@@ -43,7 +43,7 @@ fn write_view(file: &mut dyn Write, sheet: &Sheet, view: &SheetView) -> io::Resu
     for (i, face) in view.drawing.faces.iter().enumerate() {
         write!(file, "{}\n{{\"part\":{},\"name\":", if i > 0 { "," } else { "" }, face.part)?;
         serde_json::to_writer(&mut *file, sheet.part_name(face.part))?;
-        write!(file, ",\"triangle\":{},\"color\":", face.triangle)?;
+        write!(file, ",\"triangle\":{},\"cut\":{},\"color\":", face.triangle, face.cut)?;
         serde_json::to_writer(&mut *file, &face.color)?;
         file.write_all(b",\"contours\":[")?;
         for (k, contour) in face.contours.iter().enumerate() {

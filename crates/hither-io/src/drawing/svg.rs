@@ -84,7 +84,7 @@ fn write_faces(file: &mut dyn Write, sheet: &Sheet, view: &SheetView) -> io::Res
         let part = of_part[0].part;
         let name = escaped(sheet.part_name(part));
         writeln!(file, "<g class=\"part faces\" data-part=\"{part}\" data-name=\"{name}\">")?;
-        for group in of_part.chunk_by(|a, b| a.color == b.color) {
+        for group in of_part.chunk_by(|a, b| (a.color, a.cut) == (b.color, b.cut)) {
             text.clear();
             for face in group {
                 for contour in &face.contours {
@@ -93,7 +93,8 @@ fn write_faces(file: &mut dyn Write, sheet: &Sheet, view: &SheetView) -> io::Res
             }
             let [r, g, b] = group[0].color;
             // A hair of the same colour around each face hides the seams that viewers' antialiasing makes.
-            write!(file, "<path class=\"face\" fill=\"#{r:02x}{g:02x}{b:02x}\" stroke=\"#{r:02x}{g:02x}{b:02x}\" d=\"")?;
+            let class = if group[0].cut { "face cut" } else { "face" };
+            write!(file, "<path class=\"{class}\" style=\"fill:#{r:02x}{g:02x}{b:02x};stroke:#{r:02x}{g:02x}{b:02x}\" d=\"")?;
             file.write_all(&text)?;
             writeln!(file, "\"/>")?;
         }

@@ -29,6 +29,7 @@ fn drawing() -> Drawing {
         faces: vec![Face {
             part: 1,
             triangle: 4,
+            cut: false,
             color: [255, 0, 16],
             contours: vec![[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]].map(DVec2::from).to_vec()],
         }],
@@ -66,7 +67,7 @@ fn svg_has_groups_and_classes() {
     assert!(text.contains("data-part=\"0\" data-name=\"a&lt;b&gt;&amp;&quot;c&quot;\""));
     assert!(text.contains("<path class=\"visible silhouette\" d=\"M1 2l20 0 0 11\"/>"), "{text}");
     assert!(text.contains("<path class=\"hidden crease\" data-covers=\"2\" d=\"M7 8l2 2\"/>"));
-    assert!(text.contains("fill=\"#ff0010\"") && text.contains("M1 2l2 0 0 2z"));
+    assert!(text.contains("fill:#ff0010") && text.contains("M1 2l2 0 0 2z"));
     assert!(text.ends_with("</svg>\n"));
 }
 

@@ -1,17 +1,20 @@
 //! From a preparation and a view to a drawing: the order of the work.
 
+use super::caps;
 use super::coincident;
 use super::cover::{self, Cover};
-use super::drawing::{Counters, Drawing, Kind};
+use super::drawing::{Counters, Drawing, Face, Kind};
 use super::edges::Choice;
+use super::faces;
 use super::grid::Grid;
+use super::hatch;
 use super::intersections;
 use super::lens::{HalfSpace, Lens};
 use super::occluders::Occluders;
 use super::shown::{Fate, Shown};
 use super::strokes;
 use super::trace::{Scratch, Tracer};
-use super::{LineOptions, Preparation};
+use super::{FaceColor, Kinds, LineOptions, Preparation};
 use crate::conventions::{View, ViewError};
 use crate::geometry::Aabb;
 use glam::{DAffine3, DVec2, DVec3};
@@ -87,11 +90,12 @@ impl Preparation {
         if options.kinds.intersection || options.kinds.contact || !shown.sections.is_empty() {
             intersections::add(&tracer, options, parallel, &mut pieces, &mut counters);
         }
+        let faces = find_faces(&tracer, options, parallel, &mut pieces);
         counters.segments = pieces.len() as u64;
         counters.visible_segments = pieces.iter().filter(|p| p.covers == 0).count() as u64;
         coincident::draw_once(&mut pieces);
         let (points, strokes) = strokes::join(pieces);
-        Drawing { width: picture.x, height: picture.y, points, strokes, faces: Vec::new(), counters }
+        Drawing { width: picture.x, height: picture.y, points, strokes, faces, counters }
     }
 
     /// Instances that are in the view, nearest first.
@@ -137,6 +141,7 @@ impl Preparation {
                 cover.add(&shown, |t| !see_through(t));
             }
         }
+        caps::add(&mut shown);
         cover::settle(&mut shown, cover.as_ref(), picture);
         (shown, cover)
     }
@@ -148,6 +153,9 @@ fn see_through<'a>(shown: &'a Shown, options: &LineOptions) -> impl Fn(u32) -> b
     move |t: u32| {
         asked && {
             let solid = &shown.solids[shown.solid_of(t)];
+            if shown.cap(t).is_some() {
+                return false;
+            }
             let of = &solid.topology.see_through;
             !of.is_empty() && of[shown.origin(solid, t) as usize]
         }
@@ -253,6 +261,22 @@ fn trace_edges(tracer: &Tracer, options: &LineOptions, parallel: bool, counters:
         counters.tests += tests;
     }
     all
+}
+
+/// The visible faces, if they are asked for, and hatching of them among the pieces.
+fn find_faces(tracer: &Tracer, options: &LineOptions, parallel: bool, pieces: &mut Vec<Piece>) -> Vec<Face> {
+    if options.faces.is_none() && options.hatch.is_none() {
+        return Vec::new();
+    }
+    // All lines bound faces, whichever of them are drawn.
+    let all = LineOptions { kinds: Kinds::ALL, crease_angle: 0.0, ..options.clone() };
+    let mut aside = Counters::default();
+    let mut bounds = trace_edges(tracer, &all, parallel, &mut aside);
+    intersections::add(tracer, &all, parallel, &mut bounds, &mut aside);
+    if let Some(spacing) = options.hatch {
+        pieces.extend(hatch::lines(&faces::find(tracer, &bounds, FaceColor::Flat), spacing));
+    }
+    options.faces.map_or_else(Vec::new, |color| faces::find(tracer, &bounds, color))
 }
 
 /// Turns the parts that tracing found into pieces.

@@ -22,11 +22,13 @@ pub enum Kind {
     Border,
     /// What the user marked.
     Marked,
+    /// Filling of a face.
+    Hatch,
 }
 
 impl Kind {
     /// Every kind, in the order in which one that lies on another is preferred.
-    pub const ALL: [Kind; 8] = [
+    pub const ALL: [Kind; 9] = [
         Kind::Section,
         Kind::Boundary,
         Kind::Silhouette,
@@ -35,6 +37,7 @@ impl Kind {
         Kind::Contact,
         Kind::Border,
         Kind::Marked,
+        Kind::Hatch,
     ];
 
     /// Its name in files and on the command line.
@@ -48,6 +51,7 @@ impl Kind {
             Kind::Contact => "contact",
             Kind::Border => "border",
             Kind::Marked => "marked",
+            Kind::Hatch => "hatch",
         }
     }
 }
@@ -70,8 +74,10 @@ pub struct Stroke {
 pub struct Face {
     /// The instance that it belongs to.
     pub part: u32,
-    /// A triangle of the instance's mesh in whose plane it is.
+    /// A triangle of the instance's mesh in whose plane it is; of a cut `u32::MAX`.
     pub triangle: u32,
+    /// Whether it is where a section plane cuts.
+    pub cut: bool,
     /// sRGB.
     pub color: [u8; 3],
     /// The outline and then the holes, pixels, +y down; closed, without repeating the first point.

@@ -129,6 +129,9 @@ fn meetings_in_row(tracer: &Tracer, row: usize, found: &mut Vec<Meeting>) {
 
 /// Where two triangles meet, unless they share an edge, lie in one plane, or meet in less than a line.
 fn meeting(shown: &Shown, a: u32, b: u32) -> Option<Meeting> {
+    if shown.cap(a).is_some() || shown.cap(b).is_some() {
+        return None;
+    }
     let vertices = [a, b].map(|t| shown.triangles[t as usize]);
     if vertices[0].iter().filter(|v| vertices[1].contains(v)).count() > 1 {
         return None;

@@ -11,6 +11,8 @@
 //! 3. `trace`: each line is followed through the grid; `hide` finds the exact part that one triangle hides.
 //!    Signs that decide are exact ([Shewchuk 1997]); end points are crossings of lines, never samples.
 //! 4. `coincident` draws once what lies on one another; `strokes` joins the rest into few long strokes.
+//! 5. If they are asked for, `faces` cuts the paper along all visible lines into regions, and finds what each
+//!    of them shows. `caps` closes what section planes open.
 //!
 //! What counts: a surface hides what is farther along the line of sight, whichever of its sides is seen.
 //! What is nearer to a surface than the *tolerance*, a few units in the last place of a coordinate in `f32`,
@@ -19,12 +21,16 @@
 //!
 //! Not done: surfaces with holes by a mask are drawn solid.
 
+mod arrangement;
+mod caps;
 mod coincident;
 mod cover;
 mod draw;
 mod drawing;
 mod edges;
+mod faces;
 mod grid;
+mod hatch;
 mod hide;
 mod intersections;
 mod lens;
@@ -104,6 +110,17 @@ pub struct PrepareOptions {
     pub marked: Vec<(u32, [u32; 2])>,
 }
 
+/// How visible faces are coloured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaceColor {
+    /// White.
+    White,
+    /// The material's colour, without its texture.
+    Material,
+    /// The material's colour, darker where a face turns away from a light above the eye.
+    Flat,
+}
+
 /// A plane that cuts the scene: what is on the side of its normal is taken away.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SectionPlane {
@@ -128,6 +145,10 @@ pub struct LineOptions {
     pub transparent_hides: bool,
     /// Planes that cut the scene.
     pub sections: Vec<SectionPlane>,
+    /// Whether visible faces are wanted, too, and in which colour.
+    pub faces: Option<FaceColor>,
+    /// Distance of lines that fill faces, pixels; the faces are shaded flat for it.
+    pub hatch: Option<f64>,
     /// Worker threads; 0 is one for each core. The drawing does not depend on it.
     pub threads: usize,
 }
@@ -140,6 +161,8 @@ impl Default for LineOptions {
             hidden: false,
             transparent_hides: true,
             sections: Vec::new(),
+            faces: None,
+            hatch: None,
             threads: 0,
         }
     }

@@ -7,7 +7,7 @@
 use super::lens::{HalfSpace, Lens};
 use super::predicates::orientation;
 use super::topology::{Mix, NONE, Topology};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 use std::collections::HashMap;
 
 /// What became of a triangle.
@@ -65,8 +65,17 @@ pub(super) struct Shown<'p> {
     /// The sense of rotation of the projected corners: 1, −1, or 0 for edge-on.
     pub facing: Vec<i8>,
     pub fate: Vec<Fate>,
+    /// Of the triangles after those of all solids, what they close.
+    pub caps: Vec<Cap>,
     /// Lines where section planes cut, between vertices; with the solid and the plane.
     pub sections: Vec<SectionLine>,
+}
+
+/// What a triangle of a cap belongs to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cap {
+    pub plane: u32,
+    pub solid: u32,
 }
 
 /// A piece of the outline of a cut.
@@ -88,6 +97,7 @@ impl<'p> Shown<'p> {
             triangles: Vec::new(),
             facing: Vec::new(),
             fate: Vec::new(),
+            caps: Vec::new(),
             sections: Vec::new(),
         }
     }
@@ -270,9 +280,43 @@ impl<'p> Shown<'p> {
         solid.cut.as_ref().map_or(at, |cut| cut.origin[at as usize])
     }
 
+    /// The cap that a triangle is part of, if it is.
+    pub fn cap(&self, triangle: u32) -> Option<&Cap> {
+        let first = self.triangles.len() - self.caps.len();
+        (triangle as usize).checked_sub(first).map(|at| &self.caps[at])
+    }
+
+    /// The plane of the cap that a triangle is part of, if it is.
+    pub fn cap_plane(&self, triangle: u32) -> Option<u32> {
+        self.cap(triangle).map(|cap| cap.plane)
+    }
+
     /// The solid that a triangle belongs to.
     pub fn solid_of(&self, triangle: u32) -> usize {
-        self.solids.partition_point(|s| s.first_triangle <= triangle) - 1
+        match self.cap(triangle) {
+            Some(cap) => cap.solid as usize,
+            None => self.solids.partition_point(|s| s.first_triangle <= triangle) - 1,
+        }
+    }
+
+    /// The instance that a triangle belongs to.
+    pub fn part_of(&self, triangle: u32) -> u32 {
+        self.solids[self.solid_of(triangle)].part
+    }
+
+    /// The mesh's triangle behind a triangle of the view; of a cap [`NONE`].
+    pub fn mesh_triangle(&self, triangle: u32) -> u32 {
+        if self.cap(triangle).is_some() {
+            return NONE;
+        }
+        self.origin(&self.solids[self.solid_of(triangle)], triangle)
+    }
+
+    /// Colour of a triangle, linear; a cap has that of its solid's first triangle.
+    pub fn color_of(&self, triangle: u32) -> Vec3 {
+        let of_mesh = self.mesh_triangle(triangle);
+        let topology = self.solids[self.solid_of(triangle)].topology;
+        topology.color(if of_mesh == NONE { 0 } else { of_mesh })
     }
 
     pub fn corners(&self, triangle: u32) -> [DVec3; 3] {

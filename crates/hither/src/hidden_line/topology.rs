@@ -53,6 +53,10 @@ pub(super) struct Topology {
     pub edges: Vec<Edge>,
     /// Triangles that hide nothing if blended materials do not; empty where there are none.
     pub see_through: Vec<bool>,
+    /// Ends of the runs of triangles with one material, and its colour, linear.
+    colors: Vec<(u32, Vec3)>,
+    /// A factor for each triangle; empty where there are none.
+    tints: Vec<Vec3>,
 }
 
 impl Topology {
@@ -68,6 +72,8 @@ impl Topology {
             flips: vec![0; triangles.len()],
             edges: Vec::new(),
             see_through: see_through(scene, mesh),
+            colors: colors(scene, mesh),
+            tints: tints(mesh),
             positions,
             triangles,
         };
@@ -81,6 +87,13 @@ impl Topology {
             }
         }
         topology
+    }
+
+    /// Colour of a triangle, linear, without its texture.
+    pub fn color(&self, triangle: u32) -> Vec3 {
+        let run = self.colors.partition_point(|c| c.0 <= triangle);
+        let color = self.colors.get(run).map_or(Vec3::ONE, |c| c.1);
+        color * self.tints.get(triangle as usize).copied().unwrap_or(Vec3::ONE)
     }
 
     /// Half-edges sorted by their smaller vertex (counting), then by the larger: runs are edges.
@@ -230,6 +243,20 @@ fn materials(mesh: &Mesh) -> Vec<u32> {
         return Vec::new();
     }
     mesh.primitives.iter().flat_map(|p| p.triangles.clone().map(move |_| of(p))).collect()
+}
+
+fn colors(scene: &Scene, mesh: &Mesh) -> Vec<(u32, Vec3)> {
+    let of = |m: Option<u32>| m.map_or(Vec3::ONE, |m| scene.materials[m as usize].base_color.truncate());
+    mesh.primitives.iter().map(|p| (p.triangles.end, of(p.material))).collect()
+}
+
+/// The mean of the corners' colours.
+fn tints(mesh: &Mesh) -> Vec<Vec3> {
+    if mesh.colors.is_empty() {
+        return Vec::new();
+    }
+    let mean = |t: &[u32; 3]| t.iter().map(|&v| mesh.colors[v as usize].truncate()).sum::<Vec3>() / 3.0;
+    mesh.triangles.iter().map(mean).collect()
 }
 
 fn see_through(scene: &Scene, mesh: &Mesh) -> Vec<bool> {

@@ -4,7 +4,7 @@ use crate::options::{self, ReportOptions, ViewOptions};
 use clap::ValueEnum;
 use glam::DVec3;
 use hither::hidden_line::views::{Angle, STANDARD_VIEWS};
-use hither::hidden_line::{Kinds, LineOptions, SectionPlane};
+use hither::hidden_line::{FaceColor, Kinds, LineOptions, SectionPlane};
 use std::path::PathBuf;
 
 /// A scene as a line drawing
@@ -74,6 +74,8 @@ impl Arguments {
             hidden: self.hidden,
             transparent_hides: !self.see_through,
             sections: self.cut.clone(),
+            faces: self.faces.map(Faces::color),
+            hatch: self.hatch,
             threads: usize::from(self.threads),
         }
     }
@@ -88,6 +90,17 @@ pub enum Faces {
     Material,
     /// The material's colour, darker where a face turns away
     Flat,
+}
+
+impl Faces {
+    /// The engine's name for it.
+    fn color(self) -> FaceColor {
+        match self {
+            Faces::White => FaceColor::White,
+            Faces::Material => FaceColor::Material,
+            Faces::Flat => FaceColor::Flat,
+        }
+    }
 }
 
 /// `--angle`.

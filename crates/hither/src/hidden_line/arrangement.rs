@@ -1,0 +1,125 @@
+//! Lines cut the plane into regions: polygons with holes that tile a rectangle exactly.
+//!
+//! The cutting itself is `i_overlay`'s: coordinates go to a grid of 62-bit integers, crossings are snapped to
+//! it, and every predicate is exact. What is done here: lines that end *on* another line, computed in
+//! floating point, are made a little longer, so that they do cross it; what then sticks out cuts nothing.
+
+use glam::DVec2;
+use i_overlay::core::fill_rule::FillRule;
+use i_overlay::float::simplify::SimplifyShape;
+use i_overlay::float::slice::FloatSlice;
+
+/// By how much lines are longer at both ends. More than rounding, less than anything that is drawn.
+const LONGER: f64 = 1e-6;
+
+/// A polygon: its outline, then its holes. Closed, without repeating the first point.
+pub(super) type Polygon = Vec<Vec<DVec2>>;
+
+/// Cuts the rectangle from `min` to `max` along the lines.
+pub(super) fn cut(min: DVec2, max: DVec2, lines: impl Iterator<Item = [DVec2; 2]>) -> Vec<Polygon> {
+    let outline = vec![[min.x, min.y], [max.x, min.y], [max.x, max.y], [min.x, max.y]];
+    let paths: Vec<Vec<[f64; 2]>> = lines
+        .filter(|[a, b]| a != b)
+        .map(|[a, b]| {
+            let more = (b - a).normalize_or_zero() * LONGER;
+            vec![(a - more).to_array(), a.to_array(), b.to_array(), (b + more).to_array()]
+        })
+        .collect();
+    if paths.is_empty() {
+        return vec![vec![outline.into_iter().map(DVec2::from).collect()]];
+    }
+    polygons(outline.slice_by_as::<i64>(&paths, FillRule::EvenOdd))
+}
+
+/// The polygons together, without the lines between those that share an edge.
+pub(super) fn merged(parts: &[Polygon]) -> Vec<Polygon> {
+    let shapes: Vec<Vec<Vec<[f64; 2]>>> = parts
+        .iter()
+        .map(|p| p.iter().map(|c| c.iter().map(|v| v.to_array()).collect()).collect())
+        .collect();
+    polygons(shapes.simplify_shape_as::<i64>(FillRule::EvenOdd))
+}
+
+fn polygons(shapes: Vec<Vec<Vec<[f64; 2]>>>) -> Vec<Polygon> {
+    let polygon = |shape: Vec<Vec<[f64; 2]>>| -> Polygon {
+        shape.into_iter().map(|c| c.into_iter().map(DVec2::from).collect()).collect()
+    };
+    shapes.into_iter().map(polygon).collect()
+}
+
+/// A point well inside a polygon: the middle of the widest stretch on some horizontal lines through it.
+/// `None` if it is too thin to have one.
+pub(super) fn point_inside(polygon: &Polygon) -> Option<DVec2> {
+    /// Horizontal lines that are tried.
+    const LINES: usize = 7;
+    let mut heights: Vec<f64> = polygon.iter().flatten().map(|p| p.y).collect();
+    heights.sort_unstable_by(f64::total_cmp);
+    heights.dedup();
+    let mut bands: Vec<[f64; 2]> = heights.windows(2).map(|w| [w[0], w[1]]).collect();
+    bands.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
+    let mut best: Option<(f64, DVec2)> = None;
+    for [low, high] in bands.into_iter().take(LINES) {
+        let y = 0.5 * (low + high);
+        for [from, to] in stretches(polygon, y) {
+            let room = (to - from).min(high - low);
+            if room > 0.0 && best.is_none_or(|b| room > b.0) {
+                best = Some((room, DVec2::new(0.5 * (from + to), y)));
+            }
+        }
+    }
+    best.map(|b| b.1)
+}
+
+/// Where a horizontal line is inside a polygon, from left to right.
+pub(super) fn stretches(polygon: &Polygon, y: f64) -> Vec<[f64; 2]> {
+    let mut crossings = Vec::new();
+    for contour in polygon {
+        for (i, &p) in contour.iter().enumerate() {
+            let q = contour[(i + 1) % contour.len()];
+            if (p.y <= y) != (q.y <= y) {
+                crossings.push(p.x + (q.x - p.x) * ((y - p.y) / (q.y - p.y)));
+            }
+        }
+    }
+    crossings.sort_unstable_by(f64::total_cmp);
+    crossings.chunks_exact(2).map(|c| [c[0], c[1]]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn area(polygon: &Polygon) -> f64 {
+        let twice = |c: &Vec<DVec2>| -> f64 {
+            (0..c.len()).map(|i| c[i].perp_dot(c[(i + 1) % c.len()])).sum::<f64>().abs()
+        };
+        (twice(&polygon[0]) - polygon[1..].iter().map(twice).sum::<f64>()) * 0.5
+    }
+
+    #[test]
+    fn regions_tile_the_rectangle() {
+        let v = DVec2::new;
+        let island = [v(2., 2.), v(4., 2.), v(4., 4.), v(2., 4.)];
+        let mut lines: Vec<[DVec2; 2]> = (0..4).map(|i| [island[i], island[(i + 1) % 4]]).collect();
+        // One that cuts, one that ends on it from below, short by rounding, and one that cuts nothing.
+        lines.extend([[v(0., 7.), v(10., 7.)], [v(7., 7. - 1e-13), v(7., 0.)], [v(5., 8.), v(6., 9.)]]);
+        let regions = cut(v(0., 0.), v(10., 10.), lines.into_iter());
+        let mut areas: Vec<f64> = regions.iter().map(area).collect();
+        areas.sort_by(f64::total_cmp);
+        assert_eq!(areas.len(), 4);
+        assert!((areas.iter().sum::<f64>() - 100.0).abs() < 1e-9);
+        assert!((areas[0] - 4.0).abs() < 1e-9 && (areas[1] - 21.0).abs() < 1e-9, "{areas:?}");
+        assert_eq!(regions.iter().filter(|r| r.len() == 2).count(), 1);
+    }
+
+    #[test]
+    fn merging_takes_inner_lines_away() {
+        let v = DVec2::new;
+        let square = |x: f64| vec![vec![v(x, 0.), v(x + 1., 0.), v(x + 1., 1.), v(x, 1.)]];
+        let merged = merged(&[square(0.0), square(1.0)]);
+        assert_eq!((merged.len(), merged[0].len(), merged[0][0].len()), (1, 1, 4));
+        assert!((area(&merged[0]) - 2.0).abs() < 1e-12);
+        let inside = point_inside(&merged[0]).unwrap();
+        assert!(inside.x > 0.1 && inside.x < 1.9 && inside.y > 0.1 && inside.y < 0.9);
+    }
+}

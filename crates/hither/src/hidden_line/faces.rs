@@ -1,0 +1,160 @@
+//! Visible faces as polygons with holes.
+//!
+//! The visible parts of *all* lines (every edge that is not within a plane, and every meeting of surfaces)
+//! cut the paper into regions, and within a region nothing changes: one face is seen in all of it. So a look
+//! at one point of a region tells what it shows. Regions of the same flat face are put together again. The
+//! polygons tile what is covered: they share their borders, and nothing hidden is among them.
+
+use super::arrangement::{self, Polygon};
+use super::cover::Plane;
+use super::draw::Piece;
+use super::drawing::Face;
+use super::edges::FLAT;
+use super::shown::Shown;
+use super::topology::{Topology, trait_of};
+use super::trace::Tracer;
+use super::FaceColor;
+use glam::{DVec2, DVec3, Vec3};
+use std::collections::HashMap;
+
+/// Contours of less area, square pixels, are rounding.
+const LEAST_AREA: f64 = 1e-9;
+
+/// The faces that are seen, given the visible parts of all lines.
+pub(super) fn find(tracer: &Tracer, pieces: &[Piece], color: FaceColor) -> Vec<Face> {
+    let visible = pieces.iter().filter(|p| p.covers == 0).map(|p| p.ends);
+    let regions = arrangement::cut(DVec2::ZERO, tracer.picture, visible);
+    let mut flats: HashMap<*const Topology, Vec<u32>> = HashMap::new();
+    let mut groups: HashMap<Group, Vec<(u32, Polygon)>> = HashMap::new();
+    for region in regions {
+        let Some(triangle) = arrangement::point_inside(&region).and_then(|p| nearest(tracer, p)) else {
+            continue;
+        };
+        let group = group_of(tracer.shown, triangle, &mut flats);
+        groups.entry(group).or_default().push((triangle, region));
+    }
+    let mut groups: Vec<(Group, Vec<(u32, Polygon)>)> = groups.into_iter().collect();
+    groups.sort_by_key(|g| g.0);
+    let mut faces = Vec::new();
+    for (group, mut parts) in groups {
+        let triangle = parts.iter().map(|p| p.0).min().unwrap_or_default();
+        let color = shade(tracer.shown, triangle, color);
+        let polygons: Vec<Polygon> = if parts.len() == 1 {
+            vec![parts.swap_remove(0).1]
+        } else {
+            arrangement::merged(&parts.into_iter().map(|p| p.1).collect::<Vec<_>>())
+        };
+        for mut contours in polygons {
+            if area(&contours[0]) < LEAST_AREA {
+                continue;
+            }
+            contours.retain(|c| area(c) >= LEAST_AREA);
+            let of_mesh = tracer.shown.mesh_triangle(triangle);
+            faces.push(Face { part: group.part, triangle: of_mesh, cut: group.cut, color, contours });
+        }
+    }
+    faces.sort_by(|a, b| (a.part, a.cut, a.color).cmp(&(b.part, b.cut, b.color)));
+    faces
+}
+
+fn area(contour: &[DVec2]) -> f64 {
+    let n = contour.len();
+    (0..n).map(|i| contour[i].perp_dot(contour[(i + 1) % n])).sum::<f64>().abs() * 0.5
+}
+
+/// What is one face: a flat run of neighbours of one material.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+struct Group {
+    part: u32,
+    cut: bool,
+    flat: u32,
+}
+
+fn group_of(shown: &Shown, triangle: u32, flats: &mut HashMap<*const Topology, Vec<u32>>) -> Group {
+    let part = shown.part_of(triangle);
+    if let Some(plane) = shown.cap_plane(triangle) {
+        return Group { part, cut: true, flat: plane };
+    }
+    let topology = shown.solids[shown.solid_of(triangle)].topology;
+    let flat = flats.entry(topology).or_insert_with(|| flat_runs(topology));
+    Group { part, cut: false, flat: flat[shown.mesh_triangle(triangle) as usize] }
+}
+
+/// For each triangle, the first of those that it lies in one plane with, from neighbour to neighbour.
+fn flat_runs(topology: &Topology) -> Vec<u32> {
+    let mut first: Vec<u32> = (0..topology.triangles.len() as u32).collect();
+    fn root(first: &mut [u32], mut t: u32) -> u32 {
+        while first[t as usize] != t {
+            first[t as usize] = first[first[t as usize] as usize];
+            t = first[t as usize];
+        }
+        t
+    }
+    let flat = (2.0 * (FLAT * 0.5).sin().powi(2)) as f32;
+    for edge in &topology.edges {
+        let apart = edge.traits & (trait_of::NON_MANIFOLD | trait_of::BORDER) != 0;
+        if !apart && edge.bend <= flat {
+            let [a, b] = edge.triangles.map(|t| root(&mut first, t));
+            first[a.max(b) as usize] = a.min(b);
+        }
+    }
+    for t in 0..first.len() as u32 {
+        first[t as usize] = root(&mut first, t);
+    }
+    first
+}
+
+/// The nearest triangle at a point. Of several at the same depth that of the smallest part, then the first.
+fn nearest(tracer: &Tracer, p: DVec2) -> Option<u32> {
+    let (shown, occluders) = (tracer.shown, tracer.occluders);
+    let grid = &occluders.grid;
+    let mut best: Option<(f64, u32)> = None;
+    for &i in occluders.in_cell(grid.index(grid.column(p.x), grid.row(p.y))) {
+        let occluder = &occluders.list[i as usize];
+        if best.is_some_and(|(w, _)| occluder.nearest < w - shown.lens.coarse(w)) {
+            break;
+        }
+        let [a, b, c] = shown.corners(occluder.triangle);
+        let at = p.extend(0.0);
+        let sides = [(a, b), (b, c), (c, a)].map(|(a, b)| super::predicates::cross(a, b, at));
+        if sides.iter().any(|&s| s < 0.0) && sides.iter().any(|&s| s > 0.0) {
+            continue;
+        }
+        let w = Plane::through(a, b, c).at(p).clamp(occluder.farthest, occluder.nearest);
+        let rank = |t: u32| (shown.part_of(t), t);
+        let better = match best {
+            None => true,
+            Some((before, other)) => {
+                let same = shown.lens.same_depth(shown.corners_in_view(occluder.triangle), w);
+                if (w - before).abs() <= same { rank(occluder.triangle) < rank(other) } else { w > before }
+            }
+        };
+        if better {
+            best = Some((best.map_or(w, |b| b.0.max(w)), occluder.triangle));
+        }
+    }
+    best.map(|b| b.1)
+}
+
+/// The colour of a face, sRGB.
+fn shade(shown: &Shown, triangle: u32, color: FaceColor) -> [u8; 3] {
+    let linear = match color {
+        FaceColor::White => Vec3::ONE,
+        FaceColor::Material => shown.color_of(triangle),
+        FaceColor::Flat => shown.color_of(triangle) * brightness(shown, triangle) as f32,
+    };
+    linear.to_array().map(|c| (srgb(c.clamp(0.0, 1.0)) * 255.0).round() as u8)
+}
+
+/// How bright a face is in a light from above the eye, 0 to 1; the same from both sides.
+pub(super) fn brightness(shown: &Shown, triangle: u32) -> f64 {
+    const LIGHT: DVec3 = DVec3::new(0.28, 0.56, 0.78);
+    let [a, b, c] = shown.corners_in_view(triangle);
+    let n = (b - a).cross(c - a).normalize_or(DVec3::Z);
+    let n = if n.z < 0.0 { -n } else { n };
+    0.25 + 0.75 * n.dot(LIGHT).max(0.0)
+}
+
+fn srgb(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
