@@ -14,9 +14,10 @@ const MOST_SEGMENTS: usize = 20_000;
 
 /// Adds the caps of all cuts to what is shown.
 pub(super) fn add(shown: &mut Shown) {
-    let sections = std::mem::take(&mut shown.sections);
+    let mut sections = std::mem::take(&mut shown.sections);
+    sections.sort_by_key(|s| (s.solid, s.plane));
     for cut in sections.chunk_by(|a, b| (a.solid, a.plane) == (b.solid, b.plane)) {
-        if cut.len() > MOST_SEGMENTS {
+        if cut.len() > MOST_SEGMENTS || !shown.planes[cut[0].plane as usize].section {
             continue;
         }
         let plane = shown.planes[cut[0].plane as usize];

@@ -9,6 +9,8 @@
 //! Conservative: a hidden thing may be missed, a visible one is never called hidden.
 
 use super::grid::{Cells, Grid, rectangle};
+use super::occluders::Occluders;
+use super::predicates::cross;
 use super::shown::{Fate, Shown, Solid};
 use super::topology::NONE;
 use glam::{DVec2, DVec3};
@@ -27,6 +29,10 @@ pub(super) struct Cover {
     /// The walk that came to a triangle last.
     visited: Vec<u32>,
     walk: u32,
+    /// Whether everything in a cell is known: what is not hidden by its bound is seen.
+    settled: Vec<bool>,
+    /// The triangle that the walk which gave a cell its bound began with.
+    seed: Vec<u32>,
 }
 
 impl Cover {
@@ -38,7 +44,61 @@ impl Cover {
             touched: Vec::new(),
             visited: Vec::new(),
             walk: 0,
+            settled: vec![false; grid.len()],
+            seed: vec![NONE; grid.len()],
         }
+    }
+
+    /// Whether a line that comes no nearer than `w` in these cells, and is part of a triangle that may hide,
+    /// is certainly seen in all of them.
+    pub fn shows(&self, cells: Cells, w: f64) -> bool {
+        (cells.rows.0..=cells.rows.1).all(|row| {
+            let at = row * self.grid.columns;
+            let cells = at + cells.columns.0..=at + cells.columns.1;
+            cells.into_iter().all(|cell| self.settled[cell] && self.bound[cell] <= w)
+        })
+    }
+
+    /// Finds the cells in which nothing but the surface that gave them their bound is nearer than it: no line
+    /// of this surface is hidden there. Call it when everything is added and sorted.
+    pub fn settle_cells(&mut self, shown: &Shown, occluders: &Occluders, hides: impl Fn(u32) -> bool) {
+        self.visited.clear();
+        self.visited.resize(shown.triangles.len(), 0);
+        self.walk = 0;
+        for cell in 0..self.grid.len() {
+            let seed = self.seed[cell];
+            if seed == NONE {
+                continue;
+            }
+            let solid = &shown.solids[shown.solid_of(seed)];
+            let first = solid.first_triangle as usize;
+            let center = self.grid.center(cell % self.grid.columns, cell / self.grid.columns);
+            let mut visited = std::mem::take(&mut self.visited);
+            let mut walk = Walk { visited: &mut visited[first..], number: self.walk + 1, reach: self.reach(center), center };
+            let covered = walk.from(shown, solid, seed, &hides).is_some();
+            self.walk += 1;
+            // Around a branch point a surface without folds can cover a cell twice.
+            let mut over_center = 0;
+            let alone = covered && occluders.in_cell(cell).iter().all(|&i| {
+                let occluder = &occluders.list[i as usize];
+                if occluder.nearest < self.bound[cell] {
+                    return true;
+                }
+                let corners = shown.corners(occluder.triangle);
+                if visited[occluder.triangle as usize] == self.walk {
+                    over_center += usize::from(contains(&corners, center));
+                    return true;
+                }
+                !touches(&corners, center, self.reach(center))
+            });
+            self.visited = visited;
+            self.settled[cell] = alone && over_center <= 1;
+        }
+    }
+
+    /// Half a cell's side, with room for the rounding of coordinates far outside the picture.
+    fn reach(&self, center: DVec2) -> f64 {
+        self.grid.size * 0.5 * (1.0 + 1e-6) + center.abs().max_element() * 1e-12
     }
 
     /// Whether everything in these cells that is no nearer than `w` is hidden.
@@ -62,11 +122,20 @@ impl Cover {
         self.walk = 0;
         for at in std::mem::take(&mut self.touched) {
             let (w, triangle) = std::mem::replace(&mut self.nearest[at as usize], (f64::NEG_INFINITY, NONE));
-            if w > self.bound[at as usize]
-                && let Some(farthest) = self.walk_from(shown, solid, triangle, at as usize, &hides)
-            {
+            if w <= self.bound[at as usize] {
+                continue;
+            }
+            let cell = at as usize;
+            let center = self.grid.center(cell % self.grid.columns, cell / self.grid.columns);
+            let reach = self.reach(center);
+            self.walk += 1;
+            let mut walk = Walk { visited: &mut self.visited, number: self.walk, reach, center };
+            if let Some(farthest) = walk.from(shown, solid, triangle, &hides) {
                 let bound = farthest - shown.lens.coarse(farthest);
-                self.bound[at as usize] = self.bound[at as usize].max(bound);
+                if bound > self.bound[cell] {
+                    self.bound[cell] = bound;
+                    self.seed[cell] = triangle;
+                }
             }
         }
     }
@@ -103,25 +172,30 @@ impl Cover {
             }
         }
     }
+}
 
-    /// Walks over a cell from one triangle on; the smallest w of what covers it, if it is covered.
-    fn walk_from(
+/// A walk over one cell.
+struct Walk<'a> {
+    /// For each triangle of the solid, the walk that came to it last.
+    visited: &'a mut [u32],
+    number: u32,
+    center: DVec2,
+    reach: f64,
+}
+
+impl Walk<'_> {
+    /// Walks from one triangle on; the smallest w of what covers the cell, if it is covered.
+    fn from(
         &mut self,
         shown: &Shown,
         solid: &Solid,
         triangle: u32,
-        cell: usize,
         hides: &impl Fn(u32) -> bool,
     ) -> Option<f64> {
-        self.walk += 1;
-        let half = self.grid.size * 0.5;
-        let center = self.grid.center(cell % self.grid.columns, cell / self.grid.columns);
-        // Room for the rounding of coordinates far outside the picture.
-        let reach = half * (1.0 + 1e-6) + center.abs().max_element() * 1e-12;
         let mut farthest = f64::INFINITY;
         let mut stack = [triangle; LONGEST_WALK];
         let (mut height, mut steps) = (1, 0);
-        self.visited[(triangle - solid.first_triangle) as usize] = self.walk;
+        self.visited[(triangle - solid.first_triangle) as usize] = self.number;
         while height > 0 {
             height -= 1;
             steps += 1;
@@ -129,9 +203,9 @@ impl Cover {
             let corners = shown.corners(t);
             let lowest = corners[0].z.min(corners[1].z).min(corners[2].z);
             let [a, b, c] = corners;
-            farthest = farthest.min(lowest.max(Plane::through(a, b, c).least(center, reach)));
+            farthest = farthest.min(lowest.max(Plane::through(a, b, c).least(self.center, self.reach)));
             for k in 0..3 {
-                if !enters(corners[k], corners[(k + 1) % 3], center, reach) {
+                if !enters(corners[k], corners[(k + 1) % 3], self.center, self.reach) {
                     continue;
                 }
                 let next = across(shown, solid, t, k)?;
@@ -139,8 +213,8 @@ impl Cover {
                     return None;
                 }
                 let seen = &mut self.visited[(next - solid.first_triangle) as usize];
-                if *seen != self.walk {
-                    *seen = self.walk;
+                if *seen != self.number {
+                    *seen = self.number;
                     if height == LONGEST_WALK || steps + height >= LONGEST_WALK {
                         return None;
                     }
@@ -151,6 +225,28 @@ impl Cover {
         }
         Some(farthest)
     }
+}
+
+/// Whether a triangle may have a point in the square around `center`. Errs towards yes.
+fn touches(corners: &[DVec3; 3], center: DVec2, reach: f64) -> bool {
+    let p = [0, 1, 2].map(|k: usize| corners[k].truncate() - center);
+    let (low, high) = (p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2]));
+    if low.x > reach || low.y > reach || high.x < -reach || high.y < -reach {
+        return false;
+    }
+    let turn = (p[1] - p[0]).perp_dot(p[2] - p[0]).signum();
+    (0..3).all(|k| {
+        let d = p[(k + 1) % 3] - p[k];
+        let slack = 1e-12 * d.abs().max_element() * p[k].abs().max_element();
+        turn * d.perp_dot(-p[k]) >= -reach * (d.x.abs() + d.y.abs()) - slack
+    })
+}
+
+/// Whether a point is clearly in a triangle, or on its outline.
+fn contains(corners: &[DVec3; 3], p: DVec2) -> bool {
+    let p = p.extend(0.0);
+    let sides = [0, 1, 2].map(|k: usize| cross(corners[k], corners[(k + 1) % 3], p));
+    sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0)
 }
 
 /// The triangle that continues the surface over edge `k` of `t`; `None` at a fold or where there is none.

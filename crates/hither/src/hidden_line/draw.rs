@@ -13,6 +13,7 @@ use super::lens::{HalfSpace, Lens};
 use super::occluders::Occluders;
 use super::shown::{Fate, Shown};
 use super::strokes;
+use super::topology::NONE;
 use super::trace::{Scratch, Tracer};
 use super::{FaceColor, Kinds, LineOptions, Preparation};
 use crate::conventions::{View, ViewError};
@@ -73,10 +74,13 @@ impl Preparation {
             instances_culled: (self.instances.len() - placed.len()) as u64,
             ..Counters::default()
         };
-        let (shown, cover) = self.show(lens, planes, &placed, options, picture, &mut counters);
+        let (shown, mut cover) = self.show(lens, planes, &placed, options, picture, &mut counters);
         let grid = cover.as_ref().map_or_else(|| grid_over(&placed, picture, shown.triangles.len()), |c| c.grid);
         let see_through = see_through(&shown, options);
         let occluders = Occluders::new(&shown, grid, |t| !see_through(t));
+        if let Some(cover) = &mut cover {
+            cover.settle_cells(&shown, &occluders, |t| !see_through(t));
+        }
         counters.triangles = shown.triangles.len() as u64;
         counters.triangles_live = occluders.list.len() as u64;
         let tracer = Tracer {
@@ -229,6 +233,8 @@ fn trace_edges(tracer: &Tracer, options: &LineOptions, parallel: bool, counters:
         let edges = solid.topology.edges.len();
         work.extend((0..edges).step_by(CHUNK).map(|at| (s, at..(at + CHUNK).min(edges))));
     }
+    let see_through = see_through(shown, options);
+    let hides = |t: u32| !see_through(t);
     let trace = |scratch: &mut Scratch, (s, range): &(usize, std::ops::Range<usize>)| {
         let solid = &shown.solids[*s];
         let mut pieces = Vec::new();
@@ -242,7 +248,11 @@ fn trace_edges(tracer: &Tracer, options: &LineOptions, parallel: bool, counters:
             }
             lines += 1;
             let own = |t: u32| has_edge(&shown.triangles[t as usize], ends);
-            tracer.trace(p, q, own, scratch);
+            let anchored = edge.triangles.iter().any(|&t| {
+                let place = shown.place(solid, t);
+                place != NONE && is_live(shown, place) && hides(place)
+            });
+            tracer.trace([p, q], own, anchored, scratch);
             push_parts(&mut pieces, p, q, solid.part, kind, scratch);
         }
         (pieces, lines, std::mem::take(&mut scratch.tests))
@@ -273,6 +283,7 @@ fn find_faces(tracer: &Tracer, options: &LineOptions, parallel: bool, pieces: &m
     let mut aside = Counters::default();
     let mut bounds = trace_edges(tracer, &all, parallel, &mut aside);
     intersections::add(tracer, &all, parallel, &mut bounds, &mut aside);
+    intersections::add_sections(tracer, true, &mut bounds, &mut aside);
     if let Some(spacing) = options.hatch {
         pieces.extend(hatch::lines(&faces::find(tracer, &bounds, FaceColor::Flat), spacing));
     }

@@ -11,10 +11,15 @@ use super::LineOptions;
 use super::draw::{Piece, has_edge, is_live, push_parts};
 use super::drawing::{Counters, Kind};
 use super::shown::Shown;
-use super::topology::NONE;
+use super::topology::{Mix, NONE};
 use super::trace::{Scratch, Tracer};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::collections::HashSet;
+use std::ops::Range;
+
+/// Bands of rows that are searched independently.
+const BANDS: usize = 16;
 
 /// Planes at a smaller angle than this, radians, are one plane.
 const PARALLEL: f64 = 1e-7;
@@ -36,10 +41,17 @@ pub(super) fn add(
     counters: &mut Counters,
 ) {
     let kinds = &options.kinds;
-    let of_row = |scratch: &mut Scratch, row: usize| {
+    let wanted = kinds.intersection || kinds.contact;
+    let planes: Vec<Plane> = match wanted {
+        true => tracer.occluders.list.iter().map(|o| Plane::of(tracer.shown, o.triangle)).collect(),
+        false => Vec::new(),
+    };
+    let of_band = |scratch: &mut Scratch, band: usize| {
+        let rows = tracer.occluders.grid.rows;
+        let rows = rows * band / BANDS..rows * (band + 1) / BANDS;
         let mut found = Vec::new();
         if kinds.intersection || kinds.contact {
-            meetings_in_row(tracer, row, &mut found);
+            meetings_in_rows(tracer, &planes, rows, &mut found);
         }
         found.retain(|m| match m.kind {
             Kind::Intersection => kinds.intersection,
@@ -51,75 +63,109 @@ pub(super) fn add(
             if p.truncate() == q.truncate() {
                 continue;
             }
-            tracer.trace(p, q, |t| meeting.triangles.contains(&t), scratch);
-            let part = meeting.triangles.map(|t| tracer.shown.solids[tracer.shown.solid_of(t)].part);
+            tracer.trace([p, q], |t| meeting.triangles.contains(&t), true, scratch);
+            let part = meeting.triangles.map(|t| tracer.shown.part_of(t));
             push_parts(&mut pieces, p, q, part[0].min(part[1]), meeting.kind, scratch);
         }
         (pieces, found.len() as u64, std::mem::take(&mut scratch.tests))
     };
-    let rows = tracer.occluders.grid.rows;
     let new_scratch = || Scratch::new(tracer.occluders);
     let found: Vec<_> = if parallel {
-        (0..rows).into_par_iter().map_init(new_scratch, of_row).collect()
+        (0..BANDS).into_par_iter().map_init(new_scratch, of_band).collect()
     } else {
         let mut scratch = new_scratch();
-        (0..rows).map(|row| of_row(&mut scratch, row)).collect()
+        (0..BANDS).map(|band| of_band(&mut scratch, band)).collect()
     };
     for (more, lines, tests) in found {
         pieces.extend(more);
         counters.lines += lines;
         counters.tests += tests;
     }
-    add_sections(tracer, pieces, counters);
+    add_sections(tracer, false, pieces, counters);
 }
 
-/// The outlines of cuts.
-fn add_sections(tracer: &Tracer, pieces: &mut Vec<Piece>, counters: &mut Counters) {
+/// The outlines of cuts; also those by the view's range of depth, if they are wanted.
+pub(super) fn add_sections(tracer: &Tracer, all: bool, pieces: &mut Vec<Piece>, counters: &mut Counters) {
     let shown = tracer.shown;
     let mut scratch = Scratch::new(tracer.occluders);
     for line in &shown.sections {
         let [p, q] = line.vertices.map(|v| shown.screen[v as usize]);
+        if !all && !shown.planes[line.plane as usize].section {
+            continue;
+        }
         if p.truncate() == q.truncate() {
             continue;
         }
-        tracer.trace(p, q, |t| has_edge(&shown.triangles[t as usize], line.vertices), &mut scratch);
+        let own = |t: u32| has_edge(&shown.triangles[t as usize], line.vertices);
+        tracer.trace([p, q], own, false, &mut scratch);
         push_parts(pieces, p, q, shown.solids[line.solid as usize].part, Kind::Section, &scratch);
         counters.lines += 1;
     }
     counters.tests += scratch.tests;
 }
 
-/// The meetings of triangles whose boxes' overlap begins in a row of cells.
-fn meetings_in_row(tracer: &Tracer, row: usize, found: &mut Vec<Meeting>) {
+/// The plane of a triangle in view space.
+struct Plane {
+    normal: DVec3,
+    offset: f64,
+}
+
+impl Plane {
+    fn of(shown: &Shown, triangle: u32) -> Plane {
+        let [a, b, c] = shown.corners_in_view(triangle);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        Plane { normal, offset: -normal.dot(a) }
+    }
+
+    /// Whether all corners are farther from the plane than `tolerance`, on one side.
+    fn misses(&self, corners: &[DVec3; 3], tolerance: f64) -> bool {
+        let side = |p: DVec3| self.normal.dot(p) + self.offset;
+        let [a, b, c] = [side(corners[0]), side(corners[1]), side(corners[2])];
+        (a > tolerance && b > tolerance && c > tolerance) || (a < -tolerance && b < -tolerance && c < -tolerance)
+    }
+}
+
+/// The meetings of pairs of triangles that share a cell of these rows, each once in all bands together.
+fn meetings_in_rows(tracer: &Tracer, planes: &[Plane], rows: Range<usize>, found: &mut Vec<Meeting>) {
     let (shown, occluders) = (tracer.shown, tracer.occluders);
     let grid = &occluders.grid;
-    for column in 0..grid.columns {
-        let cell = occluders.in_cell(grid.index(column, row));
-        for (i, &a) in cell.iter().enumerate() {
+    // A plane's offset is rounded: what it rejects must be clearly beyond the tolerance.
+    let clear = shown.lens.tolerance * 2.0;
+    let mut known: HashSet<(u32, u32), Mix> = HashSet::default();
+    for cell in rows.start * grid.columns..rows.end * grid.columns {
+        let (column, row) = (cell % grid.columns, cell / grid.columns);
+        let list = occluders.in_cell(cell);
+        for (i, &a) in list.iter().enumerate() {
             let first = &occluders.list[a as usize];
             let ra = first.rectangle();
             let least = first.farthest - shown.lens.coarse(first.nearest);
-            for &b in &cell[i + 1..] {
+            let corners = shown.corners_in_view(first.triangle);
+            for &b in &list[i + 1..] {
                 let second = &occluders.list[b as usize];
                 if second.nearest < least {
                     break;
                 }
-                if !second.meets(&ra) {
+                if !second.meets(&ra)
+                    || planes[b as usize].misses(&corners, clear)
+                    || planes[a as usize].misses(&shown.corners_in_view(second.triangle), clear)
+                {
                     continue;
                 }
                 // Pairs share several cells. Small ones count in the cell where their boxes' overlap begins;
-                // a large one may not be in that cell, but is where the middle of the meeting is.
-                let here = |x: f64, y: f64| grid.column(x) == column && grid.row(y) == row;
+                // a large one may not be in that cell, and counts in the band where the meeting's middle is.
                 if first.large || second.large {
-                    let found_here = meeting(shown, first.triangle, second.triangle).filter(|m| {
-                        let middle = shown.lens.project((m.ends[0] + m.ends[1]) * 0.5);
-                        here(middle.x, middle.y)
-                    });
-                    found.extend(found_here);
+                    if known.insert((a, b)) {
+                        let meeting = meeting(shown, first.triangle, second.triangle).filter(|m| {
+                            let middle = shown.lens.project((m.ends[0] + m.ends[1]) * 0.5);
+                            rows.contains(&grid.row(middle.y))
+                        });
+                        found.extend(meeting);
+                    }
                     continue;
                 }
                 let rb = second.rectangle();
-                if here(f64::from(ra[0].max(rb[0])), f64::from(ra[1].max(rb[1]))) {
+                let (x, y) = (f64::from(ra[0].max(rb[0])), f64::from(ra[1].max(rb[1])));
+                if grid.column(x) == column && grid.row(y) == row {
                     found.extend(meeting(shown, first.triangle, second.triangle));
                 }
             }

@@ -58,21 +58,8 @@ impl Occluders {
         let mut list: Vec<Occluder> = live.map(|t| occluder(shown.corners(t), t, &grid)).collect();
         list.sort_unstable_by(|a, b| b.nearest.total_cmp(&a.nearest).then(a.triangle.cmp(&b.triangle)));
         let mut starts = vec![0u32; grid.len() + 1];
-        let touch = |o: &Occluder, mut visit: Box<dyn FnMut(usize) + '_>| {
-            let min = DVec2::new(f64::from(o.min[0]), f64::from(o.min[1]));
-            let max = DVec2::new(f64::from(o.max[0]), f64::from(o.max[1]));
-            let cells = grid.cells(min, max);
-            let corners = shown.corners(o.triangle);
-            for row in cells.rows.0..=cells.rows.1 {
-                for column in cells.columns.0..=cells.columns.1 {
-                    if !o.large || may_touch(&corners, &grid, column, row) {
-                        visit(grid.index(column, row));
-                    }
-                }
-            }
-        };
         for o in &list {
-            touch(o, Box::new(|cell| starts[cell + 1] += 1));
+            visit_cells(shown, &grid, o, |cell| starts[cell + 1] += 1);
         }
         for i in 1..starts.len() {
             starts[i] += starts[i - 1];
@@ -80,10 +67,10 @@ impl Occluders {
         let mut entries = vec![0u32; starts[grid.len()] as usize];
         let mut next = starts.clone();
         for (i, o) in list.iter().enumerate() {
-            touch(o, Box::new(|cell| {
+            visit_cells(shown, &grid, o, |cell| {
                 entries[next[cell] as usize] = i as u32;
                 next[cell] += 1;
-            }));
+            });
         }
         Occluders { grid, starts, entries, list }
     }
@@ -92,6 +79,22 @@ impl Occluders {
     #[inline]
     pub fn in_cell(&self, cell: usize) -> &[u32] {
         &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+}
+
+/// Calls `visit` for every cell that a triangle may touch.
+#[inline]
+fn visit_cells(shown: &Shown, grid: &Grid, o: &Occluder, mut visit: impl FnMut(usize)) {
+    let min = DVec2::new(f64::from(o.min[0]), f64::from(o.min[1]));
+    let max = DVec2::new(f64::from(o.max[0]), f64::from(o.max[1]));
+    let cells = grid.cells(min, max);
+    let corners = shown.corners(o.triangle);
+    for row in cells.rows.0..=cells.rows.1 {
+        for column in cells.columns.0..=cells.columns.1 {
+            if !o.large || may_touch(&corners, grid, column, row) {
+                visit(grid.index(column, row));
+            }
+        }
     }
 }
 
@@ -112,7 +115,7 @@ fn occluder(corners: [DVec3; 3], triangle: u32, grid: &Grid) -> Occluder {
 }
 
 /// Whether a large triangle may touch a cell: no side of it has the whole cell beyond it. Errs towards yes.
-fn may_touch(corners: &[DVec3; 3], grid: &Grid, column: usize, row: usize) -> bool {
+pub(super) fn may_touch(corners: &[DVec3; 3], grid: &Grid, column: usize, row: usize) -> bool {
     let center = grid.center(column, row);
     // The first and the last cells stand for all that is outside the grid.
     if column == 0 || row == 0 || column + 1 == grid.columns || row + 1 == grid.rows {

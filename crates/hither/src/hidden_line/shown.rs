@@ -67,7 +67,7 @@ pub(super) struct Shown<'p> {
     pub fate: Vec<Fate>,
     /// Of the triangles after those of all solids, what they close.
     pub caps: Vec<Cap>,
-    /// Lines where section planes cut, between vertices; with the solid and the plane.
+    /// Lines where planes cut, those of the view's range of depth among them.
     pub sections: Vec<SectionLine>,
 }
 
@@ -116,8 +116,12 @@ impl<'p> Shown<'p> {
         let lens = self.lens;
         let fresh = &self.in_view[first_vertex as usize..];
         self.screen.extend(fresh.iter().map(|&p| lens.project(p)));
-        for t in &self.triangles[first_triangle as usize..] {
-            let facing = if t[0] == NONE { 0 } else { orientation(t.map(|v| self.screen[v as usize])) };
+        let fresh = self.triangles.len() - first_triangle as usize;
+        self.facing.reserve(fresh);
+        self.fate.reserve(fresh);
+        for &[a, b, c] in &self.triangles[first_triangle as usize..] {
+            let at = |v: u32| self.screen[v as usize];
+            let facing = if a == NONE { 0 } else { orientation([at(a), at(b), at(c)]) };
             self.facing.push(facing);
             self.fate.push(if facing == 0 { Fate::EdgeOn } else { Fate::Live });
         }
@@ -206,7 +210,7 @@ impl<'p> Shown<'p> {
                 on_plane.push(v);
             }
         }
-        if plane.section && outside && on_plane.len() == 2 {
+        if outside && on_plane.len() == 2 {
             let vertices = [on_plane[0] + first, on_plane[1] + first];
             let solid = self.solids.len() as u32;
             self.sections.push(SectionLine { solid, plane: number, vertices });
@@ -319,12 +323,18 @@ impl<'p> Shown<'p> {
         topology.color(if of_mesh == NONE { 0 } else { of_mesh })
     }
 
+    /// A triangle's corners on the paper.
+    #[inline(always)]
     pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
-        self.triangles[triangle as usize].map(|v| self.screen[v as usize])
+        let [a, b, c] = self.triangles[triangle as usize];
+        [self.screen[a as usize], self.screen[b as usize], self.screen[c as usize]]
     }
 
+    /// A triangle's corners in view space.
+    #[inline(always)]
     pub fn corners_in_view(&self, triangle: u32) -> [DVec3; 3] {
-        self.triangles[triangle as usize].map(|v| self.in_view[v as usize])
+        let [a, b, c] = self.triangles[triangle as usize];
+        [self.in_view[a as usize], self.in_view[b as usize], self.in_view[c as usize]]
     }
 }
 

@@ -264,3 +264,158 @@ fn kinds_can_be_asked_for_one_by_one() {
     assert!(lines.strokes.iter().all(|s| s.kind == super::Kind::Intersection));
     assert!(!lines.strokes.is_empty());
 }
+
+/// The faces at a point.
+fn faces_at(drawing: &Drawing, p: DVec2) -> Vec<&super::Face> {
+    let inside = |face: &&super::Face| {
+        let mut crossings = 0;
+        for c in &face.contours {
+            for (i, &a) in c.iter().enumerate() {
+                let b = c[(i + 1) % c.len()];
+                if (a.y <= p.y) != (b.y <= p.y) && a.x + (b.x - a.x) * ((p.y - a.y) / (b.y - a.y)) > p.x {
+                    crossings += 1;
+                }
+            }
+        }
+        crossings % 2 == 1
+    };
+    drawing.faces.iter().filter(inside).collect()
+}
+
+fn judge_faces(name: &str, scene: &Scene, view: &View) -> (usize, usize) {
+    let preparation = Preparation::new(scene, &PrepareOptions::default());
+    let options = LineOptions { faces: Some(super::FaceColor::White), kinds: Kinds::NONE, ..all_lines() };
+    let drawing = preparation.draw(view, &options).unwrap();
+    let oracle = LineOracle::new(scene, view, preparation.tolerance());
+    let (mut right, mut unsure) = (0, 0);
+    for y in 0..view.height {
+        for x in 0..view.width {
+            let p = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            let Some(seen) = oracle.seen_at(p) else {
+                unsure += 1;
+                continue;
+            };
+            let parts: Vec<u32> = faces_at(&drawing, p).iter().map(|f| f.part).collect();
+            let expected: Vec<u32> = seen.into_iter().collect();
+            assert_eq!(parts, expected, "{name} at {p}");
+            right += 1;
+        }
+    }
+    // They share borders: put together they are as large as each for itself.
+    let all: Vec<Vec<Vec<DVec2>>> = drawing.faces.iter().map(|f| f.contours.clone()).collect();
+    let sum: f64 = drawing.faces.iter().map(super::Face::area).sum();
+    let together: f64 = super::arrangement::merged(&all)
+        .iter()
+        .map(|p| super::Face { part: 0, triangle: 0, cut: false, color: [0; 3], contours: p.clone() }.area())
+        .sum();
+    assert!((sum - together).abs() <= 1e-9 * sum.max(1.0), "{name}: {sum} and {together}");
+    (right, unsure)
+}
+
+#[test]
+fn faces_are_what_rays_see_and_tile() {
+    let (mut right, mut unsure) = (0, 0);
+    for (name, scene) in scenes::bodies() {
+        for mut view in scenes::views(&scene) {
+            (view.width, view.height) = (101, 83);
+            let (r, u) = judge_faces(name, &scene, &view);
+            right += r;
+            unsure += u;
+        }
+    }
+    for seed in 0..60 {
+        let scene = trouble::scene(seed);
+        if scene.bounds().is_none_or(|b| b.size().max_element() > 200.0) || scene.instanced_triangle_count() > 600 {
+            continue;
+        }
+        let mut view = trouble::view(seed);
+        (view.width, view.height) = (71, 57);
+        let (r, u) = judge_faces(&format!("seed {seed}"), &scene, &view);
+        right += r;
+        unsure += u;
+    }
+    println!("{right} right, {unsure} unsure");
+    assert!(unsure * 100 < right, "{unsure} unsure, {right} right");
+}
+
+#[test]
+fn a_cut_body_shows_its_cap_and_its_outline() {
+    let mut scene = Scene::new("cut");
+    scenes::add_box(&mut scene, "box", [0.0; 3], [2.0; 3]);
+    let view = scenes::views(&scene)[2];
+    let section = super::SectionPlane { point: glam::DVec3::Z * 0.5, normal: glam::DVec3::Z };
+    let preparation = Preparation::new(&scene, &PrepareOptions::default());
+    let options = LineOptions {
+        sections: vec![section],
+        faces: Some(super::FaceColor::White),
+        hatch: Some(7.0),
+        ..all_lines()
+    };
+    let drawing = preparation.draw(&view, &options).unwrap();
+    assert_eq!(drawing.faces.len(), 1);
+    assert!(drawing.faces[0].cut);
+    let scale = view.pixels_per_unit();
+    assert!((drawing.faces[0].area() - 4.0 * scale * scale).abs() < 1e-6);
+    let of = |kind| drawing.strokes.iter().filter(|s| s.kind == kind).count();
+    assert_eq!(of(super::Kind::Section), 1);
+    assert!(of(super::Kind::Hatch) > 10);
+}
+
+#[test]
+fn nothing_to_see_is_an_empty_drawing() {
+    let (_, scene) = scenes::bodies().remove(0);
+    let mut view = scenes::views(&scene)[0];
+    view.view_from_world = glam::DAffine3::from_translation(glam::DVec3::X * 100.0);
+    let preparation = Preparation::new(&scene, &PrepareOptions::default());
+    let options = LineOptions { faces: Some(super::FaceColor::Flat), hatch: Some(3.0), ..all_lines() };
+    let drawing = preparation.draw(&view, &options).unwrap();
+    assert!(drawing.strokes.is_empty() && drawing.faces.is_empty());
+    let empty = Preparation::new(&Scene::new("empty"), &PrepareOptions::default());
+    assert!(empty.draw(&view, &options).unwrap().strokes.is_empty());
+}
+
+#[test]
+fn a_million_coincident_edges_are_drawn_once() {
+    let mut scene = Scene::new("copies");
+    let (positions, triangles) = scenes::cuboid([0.0; 3], [1.0; 3]);
+    // One mesh with the box thousands of times: every edge has tens of thousands of triangles.
+    let many: Vec<[u32; 3]> = (0..14_000).flat_map(|_| triangles.iter().copied()).collect();
+    scenes::add(&mut scene, "copies", positions.clone(), many, crate::scene::Transform::default());
+    // And the same as instances.
+    for _ in 0..300 {
+        scenes::add(&mut scene, "copy", positions.clone(), triangles.clone(), crate::scene::Transform::default());
+    }
+    let view = scenes::views(&scene)[0];
+    let preparation = Preparation::new(&scene, &PrepareOptions::default());
+    let kinds = Kinds { intersection: false, contact: false, ..Kinds::ALL };
+    let drawing = preparation.draw(&view, &LineOptions { kinds, ..all_lines() }).unwrap();
+    let mut single = Scene::new("one");
+    scenes::add_box(&mut single, "box", [0.0; 3], [1.0; 3]);
+    let one = Preparation::new(&single, &PrepareOptions::default()).draw(&view, &all_lines()).unwrap();
+    assert_eq!(drawing.strokes.len(), one.strokes.len());
+    assert!((drawing.visible_length() - one.visible_length()).abs() < 1e-3);
+}
+
+#[test]
+fn rigid_motion_of_scene_and_eye_does_not_change_the_drawing() {
+    for (name, scene) in scenes::bodies() {
+        let motion = glam::DAffine3::from_rotation_translation(
+            glam::DQuat::from_axis_angle(glam::DVec3::new(0.6, 0.0, 0.8), 1.1),
+            glam::DVec3::new(1.5, -2.0, 0.7),
+        );
+        let mut moved = scene.clone();
+        for node in &mut moved.groups[0].nodes {
+            node.local = crate::scene::Transform::Affine(motion * node.local.matrix());
+        }
+        for view in scenes::views(&scene) {
+            let mut from_there = view;
+            from_there.view_from_world = view.view_from_world * motion.inverse();
+            let length = |scene: &Scene, view: &View| {
+                let preparation = Preparation::new(scene, &PrepareOptions::default());
+                preparation.draw(view, &all_lines()).unwrap().visible_length()
+            };
+            let (a, b) = (length(&scene, &view), length(&moved, &from_there));
+            assert!((a - b).abs() < 1e-4 * a, "{name}: {a} and {b}");
+        }
+    }
+}

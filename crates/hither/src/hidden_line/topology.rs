@@ -79,6 +79,12 @@ impl Topology {
         };
         let materials = materials(mesh);
         topology.find_edges(&materials);
+        if topology.drop_twins() {
+            topology.edges.clear();
+            topology.neighbours.fill([NONE; 3]);
+            topology.flips.fill(0);
+            topology.find_edges(&materials);
+        }
         if !marked.is_empty() {
             let wanted: std::collections::HashSet<[u32; 2]> =
                 marked.iter().map(|&[a, b]| ordered(corner(a), corner(b))).collect();
@@ -130,6 +136,28 @@ impl Topology {
                 rest = others;
             }
         }
+    }
+
+    /// Takes out triangles that have the same corners as another; whether there were any. Only where more
+    /// than two triangles meet in an edge, or where two face each other folded flat, can there be twins.
+    fn drop_twins(&mut self) -> bool {
+        let suspect = |e: &Edge| {
+            e.traits & trait_of::NON_MANIFOLD != 0 || (e.triangles[1] != NONE && (e.bend > 1.9 || e.traits & trait_of::FLIPPED != 0))
+        };
+        if !self.edges.iter().any(suspect) {
+            return false;
+        }
+        let mut known: HashMap<[u32; 3], (), Mix> = HashMap::default();
+        let mut found = false;
+        for t in &mut self.triangles {
+            let mut key = *t;
+            key.sort_unstable();
+            if t[0] != NONE && known.insert(key, ()).is_some() {
+                *t = [NONE; 3];
+                found = true;
+            }
+        }
+        found
     }
 
     fn add_edge(&mut self, vertices: [u32; 2], halves: &[(u32, u32)], normals: &[Vec3], materials: &[u32]) {

@@ -60,8 +60,15 @@ impl Scratch {
 
 impl Tracer<'_> {
     /// Finds the parts of the line from `p` to `q` that are inside the picture, in order, into
-    /// `scratch.parts`. Triangles of which `own` says yes are part of the line and cannot hide it.
-    pub fn trace(&self, p: DVec3, q: DVec3, own: impl Fn(u32) -> bool, scratch: &mut Scratch) {
+    /// `scratch.parts`. Triangles of which `own` says yes are part of the line and cannot hide it; `anchored`
+    /// says that one of them is among the occluders.
+    pub fn trace(
+        &self,
+        [p, q]: [DVec3; 2],
+        own: impl Fn(u32) -> bool,
+        anchored: bool,
+        scratch: &mut Scratch,
+    ) {
         scratch.parts.clear();
         let Some((start, end)) = clip_to(p, q, self.picture) else { return };
         scratch.stamp = scratch.stamp.wrapping_add(1);
@@ -76,7 +83,7 @@ impl Tracer<'_> {
         let grid = &self.occluders.grid;
         let cells = grid.cells(min, max);
         let (columns, rows) = (cells.columns.1 - cells.columns.0, cells.rows.1 - cells.rows.0);
-        let line = Line { p, q, start, end };
+        let line = Line { p, q, start, end, anchored };
         let finished = if columns <= 1 && rows <= 1 {
             self.slab(&line, (start, end), None, &own, scratch)
         } else if columns >= rows {
@@ -159,6 +166,12 @@ impl Tracer<'_> {
             scratch.hidden.push(Hidden { from: t0, to: t1 });
             return false;
         }
+        if line.anchored
+            && let Some(cover) = self.cover
+            && cover.shows(cells, a.z.max(b.z))
+        {
+            return false;
+        }
         let least = a.z.min(b.z);
         let rectangle = outwards(min, max);
         for row in cells.rows.0..=cells.rows.1 {
@@ -196,6 +209,7 @@ struct Line {
     q: DVec3,
     start: f64,
     end: f64,
+    anchored: bool,
 }
 
 /// What no hidden part covers.

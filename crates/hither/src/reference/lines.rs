@@ -150,6 +150,52 @@ impl LineOracle {
         self.middle + DVec2::new(p.x, -p.y) * scale
     }
 
+    /// What is seen at a point of the paper: the part, or `None` inside for nothing; `None` outside if it is
+    /// too near to an outline, or to a tie in depth, to be told. A tie goes to the smaller part.
+    pub fn seen_at(&self, p: DVec2) -> Option<Option<u32>> {
+        let across = (p - self.middle) / self.scale;
+        let (origin, direction, near, far) = match self.projection {
+            Projection::Perspective { near, .. } => {
+                (DVec3::ZERO, DVec3::new(across.x, -across.y, -1.0).normalize(), near, f64::INFINITY)
+            }
+            Projection::Orthographic { near, far, .. } => {
+                (DVec3::new(across.x, -across.y, 0.0), DVec3::NEG_Z, near, far)
+            }
+        };
+        let mut hits: Vec<(f64, f64, u32)> = Vec::new();
+        let mut unsure_from = f64::INFINITY;
+        for (t, part) in &self.triangles {
+            let Some((at, inside)) = pierce(t, origin, direction) else { continue };
+            let depth = -(origin + direction * at).z;
+            if inside < -OUTLINE || depth < near * (1.0 - 1e-9) || depth > far {
+                continue;
+            }
+            let n = (t[1] - t[0]).cross(t[2] - t[0]).normalize_or_zero();
+            let slack = self.tolerance / n.dot(direction).abs().max(1e-3);
+            if inside < OUTLINE || depth < near * (1.0 + 1e-9) {
+                unsure_from = unsure_from.min(at - 2.0 * slack);
+            } else {
+                hits.push((at, slack, *part as u32));
+            }
+        }
+        let Some(first) = hits.iter().map(|h| h.0).min_by(f64::total_cmp) else {
+            return if unsure_from.is_finite() { None } else { Some(None) };
+        };
+        if unsure_from < first {
+            return None;
+        }
+        let mut part = u32::MAX;
+        for (at, slack, theirs) in &hits {
+            let apart = at - first;
+            if apart <= 0.5 * slack {
+                part = part.min(*theirs);
+            } else if apart < 2.0 * slack {
+                return None;
+            }
+        }
+        Some(Some(part))
+    }
+
     /// Looks at the point at `u`, 0 to 1, of a line.
     pub fn look(&self, line: &Line, u: f64) -> Verdict {
         let point = line.ends[0].lerp(line.ends[1], u);
