@@ -8,6 +8,7 @@
 //! [`reference`](mod@reference) is the brute-force truth that every fast answer is tested against.
 #![forbid(unsafe_code)]
 
+pub mod classic;
 pub mod conventions;
 pub mod geometry;
 pub mod hidden_line;

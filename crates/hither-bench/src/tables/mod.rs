@@ -2,9 +2,11 @@
 
 mod box_tests;
 mod coherence;
+mod drawing_inputs;
 mod exact;
 mod greene;
 mod growth;
+mod lines;
 mod load;
 mod scaling;
 mod simple;
@@ -49,6 +51,8 @@ pub static TABLES: &[TableInfo] = &[
     box_tests::INFO,
     trees::INFO,
     load::INFO,
+    lines::INFO,
+    lines::GROWTH,
 ];
 
 const fn column(key: &'static str, title: &'static str, digits: usize) -> Column {

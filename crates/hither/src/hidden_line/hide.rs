@@ -7,7 +7,7 @@
 
 use super::predicates::{counts_as_left, cross};
 use super::shown::Shown;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// The hidden part of a line, in its parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,14 +91,14 @@ fn inside(p: DVec3, q: DVec3, corners: &[DVec3; 3]) -> Option<(End, End)> {
     if from >= to {
         return None;
     }
-    let w_at = |edge: usize, signs: &[f64; 3]| {
+    let w_at = |edge: usize, t: f64, signs: &[f64; 3]| {
         if edge == 3 {
             weighted(signs, corners)
         } else {
-            along(p, q, corners[edge], corners[(edge + 1) % 3])
+            along((p + (q - p) * t).truncate(), corners[edge], corners[(edge + 1) % 3])
         }
     };
-    Some((End { t: from, w: w_at(entry, &of_p) }, End { t: to, w: w_at(exit, &of_q) }))
+    Some((End { t: from, w: w_at(entry, from, &of_p) }, End { t: to, w: w_at(exit, to, &of_q) }))
 }
 
 /// w of a triangle at a point inside it, from the areas that the point makes with its edges.
@@ -109,10 +109,11 @@ fn weighted(signs: &[f64; 3], corners: &[DVec3; 3]) -> f64 {
     (area(0) * corners[0].z + area(1) * corners[1].z + area(2) * corners[2].z) / sum
 }
 
-/// w of the edge from `a` to `b` where the line through p and q crosses it.
-fn along(p: DVec3, q: DVec3, a: DVec3, b: DVec3) -> f64 {
-    let (sa, sb) = (cross(p, q, a), cross(p, q, b));
-    let u = (sa / (sa - sb)).clamp(0.0, 1.0);
-    // Along each other: any point of the edge is as good as the next.
+/// w of the edge from `a` to `b` at a point of it on the paper.
+fn along(point: DVec2, a: DVec3, b: DVec3) -> f64 {
+    let step = (b - a).truncate();
+    // By projection: where the line runs along the edge, the place of a crossing means little, but both
+    // depths must be taken at the same point.
+    let u = (step.dot(point - a.truncate()) / step.length_squared()).clamp(0.0, 1.0);
     if u.is_nan() { a.z } else { a.z + (b.z - a.z) * u }
 }

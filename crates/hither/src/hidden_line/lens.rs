@@ -57,12 +57,6 @@ impl Lens {
         DVec3::new(self.middle.x + p.x * scale, self.middle.y - p.y * scale, w)
     }
 
-    /// The point in view space that is drawn at (x, y, w).
-    pub fn unproject(&self, s: DVec3) -> DVec3 {
-        let across = DVec2::new(s.x - self.middle.x, self.middle.y - s.y) / self.pixels_per_unit;
-        if self.perspective { across.extend(-1.0) / s.z } else { across.extend(s.z) }
-    }
-
     /// The largest difference of w, near depth `w`, that any surface calls the same place.
     pub fn coarse(&self, w: f64) -> f64 {
         let per_metre = if self.perspective { w * w } else { 1.0 };

@@ -362,6 +362,21 @@ fn a_cut_body_shows_its_cap_and_its_outline() {
 }
 
 #[test]
+fn the_outline_of_a_cut_is_not_hidden_by_its_own_cap() {
+    for (name, scene) in scenes::bodies().into_iter().filter(|(name, _)| *name != "sheets") {
+        let at = scene.bounds().unwrap().center() + 0.013;
+        let section = super::SectionPlane { point: at, normal: glam::DVec3::new(0.2, 0.9, 0.3) };
+        for view in &scenes::views(&scene)[..2] {
+            let options = LineOptions { sections: vec![section], hidden: true, ..all_lines() };
+            let preparation = Preparation::new(&scene, &PrepareOptions::default());
+            let drawing = preparation.draw(view, &options).unwrap();
+            let cut: Vec<_> = drawing.strokes.iter().filter(|s| s.kind == super::Kind::Section).collect();
+            assert!(!cut.is_empty() && cut.iter().all(|s| s.covers == 0), "{name}: {cut:?}");
+        }
+    }
+}
+
+#[test]
 fn nothing_to_see_is_an_empty_drawing() {
     let (_, scene) = scenes::bodies().remove(0);
     let mut view = scenes::views(&scene)[0];
