@@ -13,4 +13,5 @@ hither render "$office" --camera open --size 480x270 --shade depth --background 
 hither render "$office" --camera open --size 480x270 --shade complexity -o docs/pictures/work-hzb.png
 hither render "$office" --camera open --size 480x270 --shade complexity --algorithm zbuffer \
   -o docs/pictures/work-zbuffer.png
+hither lines 'world:office?n=1' --camera corridor --faces flat --size 960x540 -o docs/pictures/office-lines.svg
 hither render world:hills --camera valley --size 960x540 --background $sky -o docs/pictures/hills.png

@@ -19,28 +19,23 @@ pub(super) fn draw_once(pieces: &mut Vec<Piece>) {
     if pieces.len() < 2 {
         return;
     }
+    let mut cells = Cells::new(pieces);
+    if cells.is_crowded() {
+        drop_twins(pieces);
+        cells = Cells::new(pieces);
+    }
     let lines: Vec<Line> = pieces.iter().map(Line::of).collect();
-    let cells = Cells::new(pieces);
-    let mut covered: Vec<(f64, f64)> = Vec::new();
+    let mut covered = overlaps(&cells, pieces, &lines);
+    if covered.is_empty() {
+        return;
+    }
+    covered.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let mut rest = Vec::new();
-    for i in 0..pieces.len() {
-        covered.clear();
-        let line = lines[i];
-        cells.visit(&pieces[i], |j| {
-            if j as usize != i
-                && let Some(overlap) = line.overlap(&lines[j as usize])
-                && outranks(pieces, j as usize, i)
-            {
-                covered.push(overlap);
-            }
-        });
-        if covered.is_empty() {
-            continue;
-        }
-        covered.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        let piece = pieces[i];
+    for of_piece in covered.chunk_by(|a, b| a.0 == b.0) {
+        let i = of_piece[0].0 as usize;
+        let (line, piece) = (lines[i], pieces[i]);
         let (mut at, mut first) = (0.0, true);
-        for &(from, to) in covered.iter().chain([&(line.length, line.length)]) {
+        for &(_, from, to) in of_piece.iter().chain([&(0, line.length, line.length)]) {
             if from - at > SHORTEST_PX {
                 let ends = [line.at(at, &piece), line.at(from, &piece)];
                 rest.push((i, first, Piece { ends, ..piece }));
@@ -61,6 +56,40 @@ pub(super) fn draw_once(pieces: &mut Vec<Piece>) {
         }
     }
     pieces.retain(|p| p.ends[0] != p.ends[1]);
+}
+
+/// Pieces that a more important one lies on, and between which distances; some several times.
+fn overlaps(cells: &Cells, pieces: &[Piece], lines: &[Line]) -> Vec<(u32, f64, f64)> {
+    let mut found = Vec::new();
+    let mut here: Vec<(u32, Line)> = Vec::new();
+    for cell in 0..cells.grid.len() {
+        here.clear();
+        here.extend(cells.in_cell(cell).iter().map(|&i| (i, lines[i as usize])));
+        for (k, (i, a)) in here.iter().enumerate() {
+            for (j, b) in &here[k + 1..] {
+                if !a.is_aligned(b) {
+                    continue;
+                }
+                let first_stays = outranks(pieces, *i as usize, *j as usize);
+                let (under, low, over) = if first_stays { (b, j, a) } else { (a, i, b) };
+                if let Some((from, to)) = under.overlap(over) {
+                    found.push((*low, from, to));
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Of pieces with the same ends only the most important stays: so many on one another would be compared each
+/// with each.
+fn drop_twins(pieces: &mut Vec<Piece>) {
+    let key = |p: &Piece| {
+        let ends = p.ends.map(|e| (e + 0.0).to_array().map(f64::to_bits));
+        [ends[0].min(ends[1]), ends[0].max(ends[1])]
+    };
+    pieces.sort_by_cached_key(|p| (key(p), p.covers, p.kind, p.part));
+    pieces.dedup_by(|later, first| key(later) == key(first));
 }
 
 /// Whether piece `a` is kept where it coincides with piece `b`.
@@ -96,13 +125,16 @@ impl Line {
         }
     }
 
-    /// The distances between which `other` lies on this line.
-    #[inline]
+    /// Whether the lines are so nearly parallel that they may be one where they overlap.
+    #[inline(always)]
+    fn is_aligned(&self, other: &Line) -> bool {
+        let turn = self.direction.perp_dot(other.direction);
+        turn.abs() * self.length.min(other.length) <= 2.0 * SAME_PX
+    }
+
+    /// The distances between which `other`, which is aligned, lies on this line.
     fn overlap(&self, other: &Line) -> Option<(f64, f64)> {
         let turn = self.direction.perp_dot(other.direction);
-        if turn.abs() * self.length.min(other.length) > 2.0 * SAME_PX {
-            return None;
-        }
         let start = other.from - self.from;
         let along = self.direction.dot(other.direction);
         let (t0, step) = (self.direction.dot(start), along * other.length);
@@ -147,13 +179,13 @@ impl Cells {
         cells
     }
 
-    /// Calls `with` for everything in the cells of a piece, perhaps more than once.
-    fn visit(&self, piece: &Piece, mut with: impl FnMut(u32)) {
-        walk(&self.grid, piece, |cell| {
-            for &i in &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
-                with(i);
-            }
-        });
+    /// Whether some cell has so many pieces that twins must be suspected.
+    fn is_crowded(&self) -> bool {
+        self.starts.windows(2).any(|w| w[1] - w[0] > 128)
+    }
+
+    fn in_cell(&self, cell: usize) -> &[u32] {
+        &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 }
 

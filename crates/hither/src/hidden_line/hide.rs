@@ -20,7 +20,7 @@ pub(super) struct Hidden {
 /// tolerance at one end of the part, and not farther by it at the other; else up to where they cross.
 pub(super) fn hidden_part(shown: &Shown, p: DVec3, q: DVec3, triangle: u32) -> Option<Hidden> {
     let corners = shown.corners(triangle);
-    let inside = inside(p, q, &corners)?;
+    let inside = inside(p, q, &corners, shown.facing[triangle as usize])?;
     let depth = |end: &End| {
         let on_line = p.z + (q.z - p.z) * end.t;
         (end.w - on_line, on_line)
@@ -56,19 +56,18 @@ struct End {
     w: f64,
 }
 
-/// The part of a line inside a triangle's outline, if there is any.
-fn inside(p: DVec3, q: DVec3, corners: &[DVec3; 3]) -> Option<(End, End)> {
+/// The part of a line inside a triangle's outline, if there is any. `facing` is the triangle's orientation.
+fn inside(p: DVec3, q: DVec3, corners: &[DVec3; 3], facing: i8) -> Option<(End, End)> {
     let mut of_p = [0.0; 3];
     let mut of_q = [0.0; 3];
-    let turn = cross(corners[0], corners[1], corners[2]);
     let (mut from, mut to) = (0.0f64, 1.0f64);
     let (mut entry, mut exit) = (3, 3);
     for k in 0..3 {
         let (a, b) = (corners[k], corners[(k + 1) % 3]);
         let (sp, sq) = (cross(a, b, p), cross(a, b, q));
-        let (sp, sq) = if turn < 0.0 { (-sp, -sq) } else { (sp, sq) };
+        let (sp, sq) = if facing < 0 { (-sp, -sq) } else { (sp, sq) };
         (of_p[k], of_q[k]) = (sp, sq);
-        let left = || counts_as_left(a, b) == (turn > 0.0);
+        let left = || counts_as_left(a, b) == (facing > 0);
         let p_in = sp > 0.0 || (sp == 0.0 && left());
         let q_in = sq > 0.0 || (sq == 0.0 && left());
         match (p_in, q_in) {
