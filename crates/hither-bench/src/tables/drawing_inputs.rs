@@ -80,7 +80,12 @@ pub(super) fn pierced() -> Polygons {
 }
 
 /// A surface over longitudes and latitudes; of triangles, or of quadrilaterals but at the poles.
-fn rounds(columns: u32, rows: u32, triangles: bool, at: impl Fn(f64, f64) -> DVec3) -> (Vec<DVec3>, Vec<Vec<u32>>) {
+fn rounds(
+    columns: u32,
+    rows: u32,
+    triangles: bool,
+    at: impl Fn(f64, f64) -> DVec3,
+) -> (Vec<DVec3>, Vec<Vec<u32>>) {
     let mut positions = vec![at(0.0, 0.0)];
     for i in 1..rows {
         for j in 0..columns {
@@ -122,7 +127,8 @@ pub(super) fn toothpicks(count: usize) -> Polygons {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
-    let shape = |t: f64, p: f64| DVec3::new(0.025 * t.sin() * p.cos(), 0.025 * t.sin() * p.sin(), 0.5 * t.cos());
+    let shape =
+        |t: f64, p: f64| DVec3::new(0.025 * t.sin() * p.cos(), 0.025 * t.sin() * p.sin(), 0.5 * t.cos());
     let (ellipsoid, faces) = rounds(8, 41, false, shape);
     let mut axes: Vec<(DVec3, DVec3)> = Vec::new();
     let mut all = Polygons::default();

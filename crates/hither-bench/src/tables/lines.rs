@@ -68,8 +68,9 @@ fn make(table: &mut Table, options: &Options) -> Result<(), String> {
         let polygons = input();
         std::fs::write(&from, polygons.obj()).map_err(|e| format!("{}: {e}", from.display()))?;
         let edges = Kinds { intersection: false, contact: false, ..Kinds::ALL };
-        let measured = measure(&from, &to, edges, 1)
-            .and_then(|plain| Ok((plain, measure(&from, &to, Kinds::ALL, 1)?, measure(&from, &to, edges, 2)?)));
+        let measured = measure(&from, &to, edges, 1).and_then(|plain| {
+            Ok((plain, measure(&from, &to, Kinds::ALL, 1)?, measure(&from, &to, edges, 2)?))
+        });
         let _ = std::fs::remove_file(&from);
         let _ = std::fs::remove_file(&to);
         let (plain, meeting, two) = measured?;

@@ -21,7 +21,11 @@ fn write(file: &mut dyn Write, sheet: &Sheet) -> io::Result<()> {
     };
     write!(file, "999\nHither line drawing\n0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1009\n")?;
     write!(file, "9\n$INSUNITS\n70\n{units}\n")?;
-    write!(file, "9\n$EXTMIN\n10\n0\n20\n0\n9\n$EXTMAX\n10\n{}\n20\n{}\n0\nENDSEC\n", sheet.width, sheet.height)?;
+    write!(
+        file,
+        "9\n$EXTMIN\n10\n0\n20\n0\n9\n$EXTMAX\n10\n{}\n20\n{}\n0\nENDSEC\n",
+        sheet.width, sheet.height
+    )?;
     write_tables(file)?;
     write!(file, "0\nSECTION\n2\nENTITIES\n")?;
     for view in &sheet.views {
@@ -42,7 +46,10 @@ fn write(file: &mut dyn Write, sheet: &Sheet) -> io::Result<()> {
 fn write_tables(file: &mut dyn Write) -> io::Result<()> {
     write!(file, "0\nSECTION\n2\nTABLES\n0\nTABLE\n2\nLTYPE\n70\n2\n")?;
     write!(file, "0\nLTYPE\n2\nCONTINUOUS\n70\n0\n3\nSolid line\n72\n65\n73\n0\n40\n0\n")?;
-    write!(file, "0\nLTYPE\n2\nHIDDEN\n70\n0\n3\n_ _ _ _\n72\n65\n73\n2\n40\n3.6\n49\n2.4\n49\n-1.2\n0\nENDTAB\n")?;
+    write!(
+        file,
+        "0\nLTYPE\n2\nHIDDEN\n70\n0\n3\n_ _ _ _\n72\n65\n73\n2\n40\n3.6\n49\n2.4\n49\n-1.2\n0\nENDTAB\n"
+    )?;
     write!(file, "0\nTABLE\n2\nLAYER\n70\n{}\n", Kind::ALL.len() * 2)?;
     for kind in Kind::ALL {
         for (hidden, line_type, color) in [(false, "CONTINUOUS", 7), (true, "HIDDEN", 8)] {

@@ -46,7 +46,8 @@ fn write(file: &mut dyn Write, sheet: &Sheet) -> io::Result<()> {
 }
 
 fn write_view(file: &mut dyn Write, sheet: &Sheet, view: &SheetView) -> io::Result<()> {
-    let name = if view.name.is_empty() { String::new() } else { format!(" id=\"{}\"", identifier(&view.name)) };
+    let name =
+        if view.name.is_empty() { String::new() } else { format!(" id=\"{}\"", identifier(&view.name)) };
     writeln!(file, "<g class=\"view\"{name}>")?;
     write_faces(file, sheet, view)?;
     let mut text = Vec::new();
@@ -94,7 +95,10 @@ fn write_faces(file: &mut dyn Write, sheet: &Sheet, view: &SheetView) -> io::Res
             let [r, g, b] = group[0].color;
             // A hair of the same colour around each face hides the seams that viewers' antialiasing makes.
             let class = if group[0].cut { "face cut" } else { "face" };
-            write!(file, "<path class=\"{class}\" style=\"fill:#{r:02x}{g:02x}{b:02x};stroke:#{r:02x}{g:02x}{b:02x}\" d=\"")?;
+            write!(
+                file,
+                "<path class=\"{class}\" style=\"fill:#{r:02x}{g:02x}{b:02x};stroke:#{r:02x}{g:02x}{b:02x}\" d=\""
+            )?;
             file.write_all(&text)?;
             writeln!(file, "\"/>")?;
         }

@@ -41,7 +41,8 @@ fn written(write: impl Fn(&Path, &Sheet) -> Result<(), Error>, extension: &str) 
     let path = std::env::temp_dir().join(format!("hither-drawing-{}.{extension}", std::process::id()));
     let drawing = drawing();
     let names = ["a<b>&\"c\"".to_owned()];
-    let view = SheetView { name: "front".into(), drawing: &drawing, origin: DVec2::new(1.0, 2.0), scale: 2.0 };
+    let view =
+        SheetView { name: "front".into(), drawing: &drawing, origin: DVec2::new(1.0, 2.0), scale: 2.0 };
     let sheet = Sheet {
         title: "test",
         width: 50.0,

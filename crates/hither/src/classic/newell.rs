@@ -171,7 +171,10 @@ mod tests {
 
     #[test]
     fn the_lectures_penetrating_triangle_is_split_by_the_rectangle() {
-        let at = |points: &[[f64; 3]], source| Facet { points: points.iter().map(|&p| p.into()).collect(), source };
+        let at = |points: &[[f64; 3]], source| Facet {
+            points: points.iter().map(|&p| p.into()).collect(),
+            source,
+        };
         let rectangle = at(&[[10., 5., 10.], [10., 25., 10.], [25., 25., 10.], [25., 5., 10.]], 0);
         let triangle = at(&[[15., 15., 15.], [25., 25., 5.], [30., 10., 5.]], 1);
         let order = newell_newell_sancha(&[triangle, rectangle]);

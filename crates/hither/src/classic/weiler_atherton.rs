@@ -174,9 +174,7 @@ fn rings(
 /// Where the edges p–q and a–b cross: places along both, and whether q is to the left of a–b. Outer `None`
 /// if three of the points are on a line where that matters.
 fn cross(p: DVec2, q: DVec2, a: DVec2, b: DVec2) -> Option<Option<(f64, f64, bool)>> {
-    let apart = |x: [f64; 2], y: [f64; 2]| {
-        x[0].max(x[1]) < y[0].min(y[1]) || y[0].max(y[1]) < x[0].min(x[1])
-    };
+    let apart = |x: [f64; 2], y: [f64; 2]| x[0].max(x[1]) < y[0].min(y[1]) || y[0].max(y[1]) < x[0].min(x[1]);
     if apart([p.x, q.x], [a.x, b.x]) || apart([p.y, q.y], [a.y, b.y]) {
         return Some(None);
     }
@@ -324,7 +322,9 @@ impl Facet {
     /// Perpendicular to the facet, as long as twice its area [Newell].
     pub(super) fn normal(&self) -> DVec3 {
         let n = self.points.len();
-        (0..n).map(|i| (self.points[i] - self.points[0]).cross(self.points[(i + 1) % n] - self.points[0])).sum()
+        (0..n)
+            .map(|i| (self.points[i] - self.points[0]).cross(self.points[(i + 1) % n] - self.points[0]))
+            .sum()
     }
 }
 
@@ -349,7 +349,8 @@ mod tests {
         let clipped = clip(&s, &t).unwrap();
         assert_eq!((clipped.inside.len(), clipped.inside[0].len()), (1, 7));
         // c is the only corner of either that is left; the six others are crossings.
-        let corners: Vec<&DVec2> = s[0].iter().chain(&t[0]).filter(|p| clipped.inside[0].contains(p)).collect();
+        let corners: Vec<&DVec2> =
+            s[0].iter().chain(&t[0]).filter(|p| clipped.inside[0].contains(p)).collect();
         assert_eq!(corners, [&DVec2::new(6., 7.)]);
         let whole = area(&clipped.inside) + area(&clipped.outside);
         assert!((whole - area(&s)).abs() < 1e-9);

@@ -33,10 +33,8 @@ pub(super) fn cut(min: DVec2, max: DVec2, lines: impl Iterator<Item = [DVec2; 2]
 
 /// The polygons together, without the lines between those that share an edge.
 pub(super) fn merged(parts: &[Polygon]) -> Vec<Polygon> {
-    let shapes: Vec<Vec<Vec<[f64; 2]>>> = parts
-        .iter()
-        .map(|p| p.iter().map(|c| c.iter().map(|v| v.to_array()).collect()).collect())
-        .collect();
+    let shapes: Vec<Vec<Vec<[f64; 2]>>> =
+        parts.iter().map(|p| p.iter().map(|c| c.iter().map(|v| v.to_array()).collect()).collect()).collect();
     polygons(shapes.simplify_shape_as::<i64>(FillRule::EvenOdd))
 }
 

@@ -191,17 +191,15 @@ impl Cells {
 
 /// The cells that a piece comes near to, column by column.
 fn walk(grid: &Grid, piece: &Piece, mut visit: impl FnMut(usize)) {
-    let [a, b] = if piece.ends[0].x <= piece.ends[1].x {
-        piece.ends
-    } else {
-        [piece.ends[1], piece.ends[0]]
-    };
+    let [a, b] = if piece.ends[0].x <= piece.ends[1].x { piece.ends } else { [piece.ends[1], piece.ends[0]] };
     let near = 2.0 * SAME_PX;
     let (first, last) = (grid.column(a.x - near), grid.column(b.x + near));
     for column in first..=last {
         let left = (grid.origin.x + column as f64 * grid.size - near).max(a.x);
         let right = (grid.origin.x + (column + 1) as f64 * grid.size + near).min(b.x);
-        let y = |x: f64| if b.x > a.x { a.y + (b.y - a.y) * ((x - a.x) / (b.x - a.x)).clamp(0.0, 1.0) } else { a.y };
+        let y = |x: f64| {
+            if b.x > a.x { a.y + (b.y - a.y) * ((x - a.x) / (b.x - a.x)).clamp(0.0, 1.0) } else { a.y }
+        };
         let (y0, y1) = if b.x - a.x > near { (y(left), y(right)) } else { (a.y, b.y) };
         for row in grid.row(y0.min(y1) - near)..=grid.row(y0.max(y1) + near) {
             visit(grid.index(column, row));

@@ -74,23 +74,29 @@ impl Cover {
             let first = solid.first_triangle as usize;
             let center = self.grid.center(cell % self.grid.columns, cell / self.grid.columns);
             let mut visited = std::mem::take(&mut self.visited);
-            let mut walk = Walk { visited: &mut visited[first..], number: self.walk + 1, reach: self.reach(center), center };
+            let mut walk = Walk {
+                visited: &mut visited[first..],
+                number: self.walk + 1,
+                reach: self.reach(center),
+                center,
+            };
             let covered = walk.from(shown, solid, seed, &hides).is_some();
             self.walk += 1;
             // Around a branch point a surface without folds can cover a cell twice.
             let mut over_center = 0;
-            let alone = covered && occluders.in_cell(cell).iter().all(|&i| {
-                let occluder = &occluders.list[i as usize];
-                if occluder.nearest < self.bound[cell] {
-                    return true;
-                }
-                let corners = shown.corners(occluder.triangle);
-                if visited[occluder.triangle as usize] == self.walk {
-                    over_center += usize::from(contains(&corners, center));
-                    return true;
-                }
-                !touches(&corners, center, self.reach(center))
-            });
+            let alone = covered
+                && occluders.in_cell(cell).iter().all(|&i| {
+                    let occluder = &occluders.list[i as usize];
+                    if occluder.nearest < self.bound[cell] {
+                        return true;
+                    }
+                    let corners = shown.corners(occluder.triangle);
+                    if visited[occluder.triangle as usize] == self.walk {
+                        over_center += usize::from(contains(&corners, center));
+                        return true;
+                    }
+                    !touches(&corners, center, self.reach(center))
+                });
             self.visited = visited;
             self.settled[cell] = alone && over_center <= 1;
         }
@@ -273,7 +279,9 @@ fn enters(p: DVec3, q: DVec3, center: DVec2, reach: f64) -> bool {
     }
     let d = q - p;
     let offset = d.perp_dot(-p).abs();
-    offset <= reach * (d.x.abs() + d.y.abs()) * (1.0 + 1e-9) + 1e-12 * p.abs().max_element() * d.abs().max_element()
+    offset
+        <= reach * (d.x.abs() + d.y.abs()) * (1.0 + 1e-9)
+            + 1e-12 * p.abs().max_element() * d.abs().max_element()
 }
 
 /// Where a horizontal line is inside a triangle.

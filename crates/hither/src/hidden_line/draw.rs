@@ -75,7 +75,8 @@ impl Preparation {
             ..Counters::default()
         };
         let (shown, mut cover) = self.show(lens, planes, &placed, options, picture, &mut counters);
-        let grid = cover.as_ref().map_or_else(|| grid_over(&placed, picture, shown.triangles.len()), |c| c.grid);
+        let grid =
+            cover.as_ref().map_or_else(|| grid_over(&placed, picture, shown.triangles.len()), |c| c.grid);
         let see_through = see_through(&shown, options);
         let occluders = Occluders::new(&shown, grid, |t| !see_through(t));
         if let Some(cover) = &mut cover {
@@ -225,7 +226,12 @@ fn grid_over(placed: &[Placed], picture: DVec2, triangles: usize) -> Grid {
 }
 
 /// Follows every edge that is to be drawn.
-fn trace_edges(tracer: &Tracer, options: &LineOptions, parallel: bool, counters: &mut Counters) -> Vec<Piece> {
+fn trace_edges(
+    tracer: &Tracer,
+    options: &LineOptions,
+    parallel: bool,
+    counters: &mut Counters,
+) -> Vec<Piece> {
     let choice = Choice::new(options.kinds, options.crease_angle, options.hidden);
     let shown = tracer.shown;
     let mut work = Vec::new();
@@ -301,7 +307,15 @@ pub(super) fn push_parts(
 ) {
     let (a, b) = (p.truncate(), q.truncate());
     // The ends themselves stay as they are, so that lines that meet there meet in every bit.
-    let at = |t: f64| if t == 0.0 { a } else if t == 1.0 { b } else { a + (b - a) * t };
+    let at = |t: f64| {
+        if t == 0.0 {
+            a
+        } else if t == 1.0 {
+            b
+        } else {
+            a + (b - a) * t
+        }
+    };
     for found in &scratch.parts {
         pieces.push(Piece { ends: [at(found.from), at(found.to)], part, kind, covers: found.covers });
     }

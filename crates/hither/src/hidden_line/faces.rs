@@ -5,6 +5,7 @@
 //! at one point of a region tells what it shows. Regions of the same flat face are put together again. The
 //! polygons tile what is covered: they share their borders, and nothing hidden is among them.
 
+use super::FaceColor;
 use super::arrangement::{self, Polygon};
 use super::cover::Plane;
 use super::draw::Piece;
@@ -13,7 +14,6 @@ use super::edges::FLAT;
 use super::shown::Shown;
 use super::topology::{Topology, trait_of};
 use super::trace::Tracer;
-use super::FaceColor;
 use glam::{DVec2, DVec3, Vec3};
 use std::collections::HashMap;
 

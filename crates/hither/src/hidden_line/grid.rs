@@ -53,10 +53,7 @@ impl Grid {
     /// The cells of a rectangle, at least one.
     #[inline]
     pub fn cells(&self, min: DVec2, max: DVec2) -> Cells {
-        Cells {
-            columns: (self.column(min.x), self.column(max.x)),
-            rows: (self.row(min.y), self.row(max.y)),
-        }
+        Cells { columns: (self.column(min.x), self.column(max.x)), rows: (self.row(min.y), self.row(max.y)) }
     }
 
     pub fn index(&self, column: usize, row: usize) -> usize {

@@ -22,10 +22,14 @@ pub(super) fn lines(faces: &[Face], spacing: f64) -> Vec<Piece> {
         let angle = if face.cut || face.part % 2 == 0 { 45f64 } else { 135f64 };
         let along = DVec2::from_angle(angle.to_radians());
         // Turned so that the lines are horizontal.
-        let turned: Polygon =
-            face.contours.iter().map(|c| c.iter().map(|p| DVec2::new(along.dot(*p), along.perp_dot(*p))).collect()).collect();
+        let turned: Polygon = face
+            .contours
+            .iter()
+            .map(|c| c.iter().map(|p| DVec2::new(along.dot(*p), along.perp_dot(*p))).collect())
+            .collect();
         let heights = || turned.iter().flatten().map(|p| p.y);
-        let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
+        let (low, high) =
+            (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
         let mut line = (low / apart).ceil();
         while line * apart < high {
             let y = line * apart;

@@ -121,7 +121,8 @@ impl Plane {
     fn misses(&self, corners: &[DVec3; 3], tolerance: f64) -> bool {
         let side = |p: DVec3| self.normal.dot(p) + self.offset;
         let [a, b, c] = [side(corners[0]), side(corners[1]), side(corners[2])];
-        (a > tolerance && b > tolerance && c > tolerance) || (a < -tolerance && b < -tolerance && c < -tolerance)
+        (a > tolerance && b > tolerance && c > tolerance)
+            || (a < -tolerance && b < -tolerance && c < -tolerance)
     }
 }
 
@@ -214,12 +215,7 @@ fn meeting(shown: &Shown, a: u32, b: u32) -> Option<Meeting> {
 
 /// On which side of a plane each corner is: a distance, or 0 within the tolerance. `None` if the triangle
 /// does not reach the plane, or lies in it.
-fn sides(
-    corners: &[DVec3; 3],
-    point: DVec3,
-    normal: DVec3,
-    tolerance: f64,
-) -> Option<[f64; 3]> {
+fn sides(corners: &[DVec3; 3], point: DVec3, normal: DVec3, tolerance: f64) -> Option<[f64; 3]> {
     let sides = corners.map(|c| {
         let side = normal.dot(c - point);
         if side.abs() <= tolerance { 0.0 } else { side }

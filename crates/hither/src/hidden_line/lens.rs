@@ -69,11 +69,8 @@ impl Lens {
         let n = (b - a).cross(c - a);
         let length = n.length();
         // Sine of the angle between the plane and the line of sight, and what a metre along it is in w.
-        let (sine, per_metre) = if self.perspective {
-            (n.dot(a).abs() * w / length, w * w)
-        } else {
-            (n.z.abs() / length, 1.0)
-        };
+        let (sine, per_metre) =
+            if self.perspective { (n.dot(a).abs() * w / length, w * w) } else { (n.z.abs() / length, 1.0) };
         // The comparison also catches a plane that cannot be told, NaN.
         let sine = if sine > FLATTEST { sine } else { FLATTEST };
         self.tolerance * per_metre / sine
@@ -81,8 +78,7 @@ impl Lens {
 
     /// Half-spaces that a view shows: beyond the near plane and before the far one.
     pub fn range(projection: &Projection) -> Vec<HalfSpace> {
-        let near =
-            HalfSpace { normal: DVec3::NEG_Z, offset: -projection.near(), section: false };
+        let near = HalfSpace { normal: DVec3::NEG_Z, offset: -projection.near(), section: false };
         match *projection {
             Projection::Perspective { .. } => vec![near],
             Projection::Orthographic { far, .. } => {

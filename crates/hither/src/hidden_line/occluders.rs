@@ -53,8 +53,8 @@ pub(super) fn outwards(min: DVec2, max: DVec2) -> [f32; 4] {
 impl Occluders {
     /// Sorts the live triangles of `shown` that `hides` says yes to.
     pub fn new(shown: &Shown, grid: Grid, hides: impl Fn(u32) -> bool) -> Occluders {
-        let live = (0..shown.triangles.len() as u32)
-            .filter(|&t| shown.fate[t as usize] == Fate::Live && hides(t));
+        let live =
+            (0..shown.triangles.len() as u32).filter(|&t| shown.fate[t as usize] == Fate::Live && hides(t));
         let mut list: Vec<Occluder> = live.map(|t| occluder(shown.corners(t), t, &grid)).collect();
         list.sort_unstable_by(|a, b| b.nearest.total_cmp(&a.nearest).then(a.triangle.cmp(&b.triangle)));
         let mut starts = vec![0u32; grid.len() + 1];

@@ -106,8 +106,7 @@ impl<'p> Shown<'p> {
     pub fn add(&mut self, topology: &'p Topology, part: u32, view_from_mesh: &DAffine3, cut: bool) {
         let first_vertex = self.in_view.len() as u32;
         let first_triangle = self.triangles.len() as u32;
-        self.in_view
-            .extend(topology.positions.iter().map(|p| view_from_mesh.transform_point3(p.as_dvec3())));
+        self.in_view.extend(topology.positions.iter().map(|p| view_from_mesh.transform_point3(p.as_dvec3())));
         let cut = if cut { self.clip(topology, first_vertex) } else { None };
         if cut.is_none() {
             let global = |v: u32| if v == NONE { NONE } else { v + first_vertex };

@@ -51,8 +51,7 @@ struct Joints {
 
 impl Joints {
     fn of(pieces: &[Piece]) -> Joints {
-        let mut names: HashMap<[i64; 2], u32, Mix> =
-            HashMap::with_capacity_and_hasher(pieces.len(), Mix);
+        let mut names: HashMap<[i64; 2], u32, Mix> = HashMap::with_capacity_and_hasher(pieces.len(), Mix);
         let mut node = Vec::with_capacity(pieces.len() * 2);
         for p in pieces.iter().flat_map(|p| p.ends) {
             let key = [(p.x * JOIN_PER_PX).round() as i64, (p.y * JOIN_PER_PX).round() as i64];
@@ -409,7 +408,9 @@ mod tests {
     #[test]
     fn a_cube_takes_four_strokes() {
         // The graph of a cube has eight points of degree three.
-        let at = |i: u32| [f64::from(i & 1) + 0.3 * f64::from(i >> 2), f64::from(i >> 1 & 1) + 0.2 * f64::from(i >> 2)];
+        let at = |i: u32| {
+            [f64::from(i & 1) + 0.3 * f64::from(i >> 2), f64::from(i >> 1 & 1) + 0.2 * f64::from(i >> 2)]
+        };
         let mut segments = Vec::new();
         for i in 0..8u32 {
             for axis in 0..3 {

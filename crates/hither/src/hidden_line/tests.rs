@@ -51,7 +51,8 @@ impl Paper<'_> {
                 let length = step.length();
                 let along = (p - *a).dot(step) / length;
                 let near = (p - *a).perp_dot(step).abs() / length <= NEAR_PX;
-                let parallel = d.perp_dot(step).abs() <= 0.05 * length * d.length() || length.min(d.length()) < 0.05;
+                let parallel =
+                    d.perp_dot(step).abs() <= 0.05 * length * d.length() || length.min(d.length()) < 0.05;
                 if near && parallel && along >= -NEAR_PX && along <= length + NEAR_PX {
                     found.push(*covers);
                 }
@@ -106,7 +107,9 @@ fn check_strokes(oracle: &LineOracle, lines: &[Line], drawing: &Drawing, score: 
                 for (line, [a, b]) in lines.iter().zip(&ends) {
                     let step = *b - *a;
                     let t = (p - *a).dot(step) / step.length_squared();
-                    if !(-1e-6..=1.0 + 1e-6).contains(&t) || (p - *a).perp_dot(step).abs() > NEAR_PX * step.length() {
+                    if !(-1e-6..=1.0 + 1e-6).contains(&t)
+                        || (p - *a).perp_dot(step).abs() > NEAR_PX * step.length()
+                    {
                         continue;
                     }
                     verdicts.push(oracle.look(line, along(oracle, line, t.clamp(0.0, 1.0))));
@@ -160,7 +163,9 @@ fn drawings_agree_with_dense_sampling_on_troublesome_scenes() {
     let mut wrong = Vec::new();
     for seed in 0..60 {
         let scene = trouble::scene(seed);
-        if scene.bounds().is_none_or(|b| b.size().max_element() > 200.0) || scene.instanced_triangle_count() > 600 {
+        if scene.bounds().is_none_or(|b| b.size().max_element() > 200.0)
+            || scene.instanced_triangle_count() > 600
+        {
             continue;
         }
         let mut view = trouble::view(seed);
@@ -325,7 +330,9 @@ fn faces_are_what_rays_see_and_tile() {
     }
     for seed in 0..60 {
         let scene = trouble::scene(seed);
-        if scene.bounds().is_none_or(|b| b.size().max_element() > 200.0) || scene.instanced_triangle_count() > 600 {
+        if scene.bounds().is_none_or(|b| b.size().max_element() > 200.0)
+            || scene.instanced_triangle_count() > 600
+        {
             continue;
         }
         let mut view = trouble::view(seed);
@@ -398,7 +405,13 @@ fn a_million_coincident_edges_are_drawn_once() {
     scenes::add(&mut scene, "copies", positions.clone(), many, crate::scene::Transform::default());
     // And the same as instances.
     for _ in 0..300 {
-        scenes::add(&mut scene, "copy", positions.clone(), triangles.clone(), crate::scene::Transform::default());
+        scenes::add(
+            &mut scene,
+            "copy",
+            positions.clone(),
+            triangles.clone(),
+            crate::scene::Transform::default(),
+        );
     }
     let view = scenes::views(&scene)[0];
     let preparation = Preparation::new(&scene, &PrepareOptions::default());

@@ -142,7 +142,8 @@ impl Topology {
     /// than two triangles meet in an edge, or where two face each other folded flat, can there be twins.
     fn drop_twins(&mut self) -> bool {
         let suspect = |e: &Edge| {
-            e.traits & trait_of::NON_MANIFOLD != 0 || (e.triangles[1] != NONE && (e.bend > 1.9 || e.traits & trait_of::FLIPPED != 0))
+            e.traits & trait_of::NON_MANIFOLD != 0
+                || (e.triangles[1] != NONE && (e.bend > 1.9 || e.traits & trait_of::FLIPPED != 0))
         };
         if !self.edges.iter().any(suspect) {
             return false;

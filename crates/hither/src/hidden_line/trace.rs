@@ -104,13 +104,7 @@ impl Tracer<'_> {
     }
 
     /// Cuts the line where it crosses columns (axis 0) or rows (axis 1); true if all of it is hidden.
-    fn follow(
-        &self,
-        line: &Line,
-        axis: usize,
-        own: &impl Fn(u32) -> bool,
-        scratch: &mut Scratch,
-    ) -> bool {
+    fn follow(&self, line: &Line, axis: usize, own: &impl Fn(u32) -> bool, scratch: &mut Scratch) -> bool {
         let grid = &self.occluders.grid;
         let (from, to) = (line.p[axis], line.q[axis]);
         let index = |x: f64| if axis == 0 { grid.column(x) } else { grid.row(x) };

@@ -55,7 +55,13 @@ impl LineOracle {
             }
         }
         let middle = DVec2::new(f64::from(view.width), f64::from(view.height)) * 0.5;
-        LineOracle { projection: view.projection, scale: view.pixels_per_unit(), middle, tolerance, triangles }
+        LineOracle {
+            projection: view.projection,
+            scale: view.pixels_per_unit(),
+            middle,
+            tolerance,
+            triangles,
+        }
     }
 
     /// Every edge that is not between two neighbours in a plane (normals within `flat` radians).

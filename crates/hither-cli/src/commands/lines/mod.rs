@@ -90,10 +90,12 @@ enum Format {
 impl Format {
     fn of(path: &Path) -> Result<Format, Failure> {
         let known = [("svg", Format::Svg), ("dxf", Format::Dxf), ("json", Format::Json)];
-        known.into_iter().find(|(extension, _)| has_extension(path, extension)).map(|k| k.1).ok_or_else(|| {
-            let what = "give the file the extension .svg, .dxf or .json";
-            Failure::usage(format!("-o {}: {what}", path.display()))
-        })
+        known.into_iter().find(|(extension, _)| has_extension(path, extension)).map(|k| k.1).ok_or_else(
+            || {
+                let what = "give the file the extension .svg, .dxf or .json";
+                Failure::usage(format!("-o {}: {what}", path.display()))
+            },
+        )
     }
 }
 
