@@ -306,3 +306,49 @@ fn a_reader_that_leaves_early_is_no_error() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(output.stderr.is_empty());
 }
+
+#[test]
+fn lines_draws_a_sheet_in_three_formats() {
+    let folder = Folder::new("lines");
+    let svg = folder.path("a.svg");
+    let report = folder.path("report.json");
+    done(&[
+        "lines", "world:lecture", "--views", "front,top,iso", "--scale", "1:200", "--hidden", "--faces", "flat",
+        "-o", &svg, "--json", &report,
+    ]);
+    let text = fs::read_to_string(&svg).unwrap();
+    for expected in ["mm\"", "id=\"front\"", "id=\"iso\"", "data-name=\"rectangle\"", "class=\"visible boundary\"", "class=\"face\""] {
+        assert!(text.contains(expected), "no {expected}");
+    }
+    let report: Value = serde_json::from_str(&fs::read_to_string(&report).unwrap()).unwrap();
+    assert_eq!(report["schema"], "hither.lines/1");
+    assert!(report["frames"][0]["visible_segments"].as_u64().unwrap() > 0);
+    let (dxf, json) = (folder.path("a.dxf"), folder.path("a.json"));
+    done(&["lines", WORLD, "--camera", "corridor", "-o", &dxf]);
+    assert!(fs::read_to_string(&dxf).unwrap().ends_with("EOF\n"));
+    done(&["lines", WORLD, "--camera", "corridor", "-o", &json]);
+    let drawing: Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
+    assert!(drawing["views"][0]["strokes"].as_array().unwrap().len() > 10);
+}
+
+#[test]
+fn lines_refuses_what_it_cannot_draw() {
+    let folder = Folder::new("lines-refused");
+    let svg = folder.path("a.svg");
+    refused(&["lines", WORLD, "-o", &folder.path("a.png")], 2, &[".svg, .dxf or .json"]);
+    refused(&["lines", WORLD, "-o", &svg, "--scale", "1:50"], 2, &["--scale", "--views"]);
+    refused(&["lines", WORLD, "-o", &svg, "--views", "side"], 2, &["side", "front"]);
+    refused(&["lines", WORLD, "-o", &svg, "--edges", "wires"], 2, &["wires", "silhouette"]);
+    refused(&["lines", WORLD, "-o", &svg, "--cut", "0,0,0,1"], 2, &["normal"]);
+    refused(&["lines", "world:office?n=33", "-o", &svg], 1, &["539,055,000 triangles"]);
+    assert!(folder.names().is_empty());
+}
+
+#[test]
+fn an_empty_drawing_is_a_valid_file_and_a_note() {
+    let folder = Folder::new("lines-empty");
+    let svg = folder.path("a.svg");
+    let output = done(&["lines", WORLD, "--eye", "0,900,0", "--target", "0,1000,0", "-o", &svg]);
+    assert!(stderr(&output).contains("nothing is visible"));
+    assert!(fs::read_to_string(&svg).unwrap().ends_with("</svg>\n"));
+}

@@ -50,7 +50,7 @@ pub(crate) const GROWTH: TableInfo = TableInfo {
 const RUNS: usize = 5;
 
 fn make(table: &mut Table, options: &Options) -> Result<(), String> {
-    /// What Blender 3.4's Line Art took, on another machine.
+    // The last is what Blender 3.4's Line Art took, ms, on another machine.
     type Input = (&'static str, fn() -> Polygons, Option<f64>);
     let inputs: [Input; 6] = [
         ("pierced cube", drawing_inputs::pierced, None),

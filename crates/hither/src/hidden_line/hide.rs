@@ -62,11 +62,11 @@ fn inside(p: DVec3, q: DVec3, corners: &[DVec3; 3], facing: i8) -> Option<(End, 
     let mut of_q = [0.0; 3];
     let (mut from, mut to) = (0.0f64, 1.0f64);
     let (mut entry, mut exit) = (3, 3);
-    for k in 0..3 {
+    for (k, (of_p, of_q)) in of_p.iter_mut().zip(&mut of_q).enumerate() {
         let (a, b) = (corners[k], corners[(k + 1) % 3]);
         let (sp, sq) = (cross(a, b, p), cross(a, b, q));
         let (sp, sq) = if facing < 0 { (-sp, -sq) } else { (sp, sq) };
-        (of_p[k], of_q[k]) = (sp, sq);
+        (*of_p, *of_q) = (sp, sq);
         let left = || counts_as_left(a, b) == (facing > 0);
         let p_in = sp > 0.0 || (sp == 0.0 && left());
         let q_in = sq > 0.0 || (sq == 0.0 && left());

@@ -27,6 +27,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let start = Instant::now();
     let mut scene = source::open(&arguments.scene, verbosity)?;
+    check_size(&scene, &arguments.scene)?;
     let read_time = start.elapsed();
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     timeline.pose_first(&mut scene);
@@ -77,6 +78,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     json.insert("prepare_ms".into(), report::milliseconds(prepare_time));
     json.insert("frames".into(), frames.into());
     outputs::write_report(arguments.report.json.as_deref(), &json.into())
+}
+
+/// Triangles in view are held in memory, some 70 bytes each.
+const MOST_TRIANGLES: u64 = 100_000_000;
+
+fn check_size(scene: &Scene, name: &str) -> Result<(), Failure> {
+    let triangles = scene.instanced_triangle_count();
+    if triangles <= MOST_TRIANGLES {
+        return Ok(());
+    }
+    Err(Failure::work(format!(
+        "{name}: it has {} triangles, and lines are drawn of {} at most; draw a part of it",
+        grouped(triangles),
+        grouped(MOST_TRIANGLES)
+    )))
 }
 
 /// What kind of file is written.
