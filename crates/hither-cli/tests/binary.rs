@@ -313,11 +313,29 @@ fn lines_draws_a_sheet_in_three_formats() {
     let svg = folder.path("a.svg");
     let report = folder.path("report.json");
     done(&[
-        "lines", "world:lecture", "--views", "front,top,iso", "--scale", "1:200", "--hidden", "--faces", "flat",
-        "-o", &svg, "--json", &report,
+        "lines",
+        "world:lecture",
+        "--views",
+        "front,top,iso",
+        "--scale",
+        "1:200",
+        "--hidden",
+        "--faces",
+        "flat",
+        "-o",
+        &svg,
+        "--json",
+        &report,
     ]);
     let text = fs::read_to_string(&svg).unwrap();
-    for expected in ["mm\"", "id=\"front\"", "id=\"iso\"", "data-name=\"rectangle\"", "class=\"visible boundary\"", "class=\"face\""] {
+    for expected in [
+        "mm\"",
+        "id=\"front\"",
+        "id=\"iso\"",
+        "data-name=\"rectangle\"",
+        "class=\"visible boundary\"",
+        "class=\"face\"",
+    ] {
         assert!(text.contains(expected), "no {expected}");
     }
     let report: Value = serde_json::from_str(&fs::read_to_string(&report).unwrap()).unwrap();

@@ -83,7 +83,7 @@ fn dxf_has_layers_and_polylines_with_y_up() {
 #[test]
 fn json_can_be_read_back() {
     let json: serde_json::Value = serde_json::from_str(&written(write_drawing_json, "json")).unwrap();
-    assert_eq!(json["views"][0]["strokes"][0]["points"][2], serde_json::json!([21.0, 13.0]));
+    assert_eq!(json["views"][0]["strokes"][0]["points"][2], serde_json::json!([21, 13]));
     assert_eq!(json["views"][0]["strokes"][1]["covers"], 2);
-    assert_eq!(json["views"][0]["faces"][0]["contours"][0][1], serde_json::json!([3.0, 2.0]));
+    assert_eq!(json["views"][0]["faces"][0]["contours"][0][1], serde_json::json!([3, 2]));
 }

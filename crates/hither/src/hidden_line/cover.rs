@@ -59,6 +59,11 @@ impl Cover {
         })
     }
 
+    /// What is farther than this is hidden in a cell.
+    pub fn bound(&self, cell: usize) -> f64 {
+        self.bound[cell]
+    }
+
     /// Finds the cells in which nothing but the surface that gave them their bound is nearer than it: no line
     /// of this surface is hidden there. Call it when everything is added and sorted.
     pub fn settle_cells(&mut self, shown: &Shown, occluders: &Occluders, hides: impl Fn(u32) -> bool) {

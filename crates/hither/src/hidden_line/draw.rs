@@ -78,7 +78,7 @@ impl Preparation {
         let grid =
             cover.as_ref().map_or_else(|| grid_over(&placed, picture, shown.triangles.len()), |c| c.grid);
         let see_through = see_through(&shown, options);
-        let occluders = Occluders::new(&shown, grid, |t| !see_through(t));
+        let occluders = Occluders::new(&shown, grid, cover.as_ref(), |t| !see_through(t));
         if let Some(cover) = &mut cover {
             cover.settle_cells(&shown, &occluders, |t| !see_through(t));
         }

@@ -7,12 +7,12 @@
 //! tolerance lies in it. The cut of an edge by a plane is computed the same for all triangles at that edge,
 //! so that the segments of neighbouring pairs meet in every bit.
 
-use super::LineOptions;
 use super::draw::{Piece, has_edge, is_live, push_parts};
 use super::drawing::{Counters, Kind};
 use super::shown::Shown;
 use super::topology::{Mix, NONE};
 use super::trace::{Scratch, Tracer};
+use super::{Kinds, LineOptions};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -20,6 +20,9 @@ use std::ops::Range;
 
 /// Bands of rows that are searched independently.
 const BANDS: usize = 16;
+
+/// Meetings that one thread traces at a time.
+const CHUNK: usize = 1024;
 
 /// Planes at a smaller angle than this, radians, are one plane.
 const PARALLEL: f64 = 1e-7;
@@ -29,6 +32,8 @@ struct Meeting {
     ends: [DVec3; 2],
     kind: Kind,
     triangles: [u32; 2],
+    /// Whether it may be found in several bands.
+    repeats: bool,
 }
 
 /// Finds the lines in which the live triangles meet, and those of sections; follows them, and adds their
@@ -46,19 +51,10 @@ pub(super) fn add(
         true => tracer.occluders.list.iter().map(|o| Plane::of(tracer.shown, o.triangle)).collect(),
         false => Vec::new(),
     };
-    let of_band = |scratch: &mut Scratch, band: usize| {
-        let rows = tracer.occluders.grid.rows;
-        let rows = rows * band / BANDS..rows * (band + 1) / BANDS;
-        let mut found = Vec::new();
-        if kinds.intersection || kinds.contact {
-            meetings_in_rows(tracer, &planes, rows, &mut found);
-        }
-        found.retain(|m| match m.kind {
-            Kind::Intersection => kinds.intersection,
-            _ => kinds.contact,
-        });
+    let meetings = meetings(tracer, kinds, &planes, parallel);
+    let of_chunk = |scratch: &mut Scratch, chunk: &[Meeting]| {
         let mut pieces = Vec::new();
-        for meeting in &found {
+        for meeting in chunk {
             let [p, q] = meeting.ends.map(|e| tracer.shown.lens.project(e));
             if p.truncate() == q.truncate() {
                 continue;
@@ -67,21 +63,47 @@ pub(super) fn add(
             let part = meeting.triangles.map(|t| tracer.shown.part_of(t));
             push_parts(&mut pieces, p, q, part[0].min(part[1]), meeting.kind, scratch);
         }
-        (pieces, found.len() as u64, std::mem::take(&mut scratch.tests))
+        (pieces, std::mem::take(&mut scratch.tests))
     };
     let new_scratch = || Scratch::new(tracer.occluders);
     let found: Vec<_> = if parallel {
-        (0..BANDS).into_par_iter().map_init(new_scratch, of_band).collect()
+        meetings.par_chunks(CHUNK).map_init(new_scratch, of_chunk).collect()
     } else {
         let mut scratch = new_scratch();
-        (0..BANDS).map(|band| of_band(&mut scratch, band)).collect()
+        meetings.chunks(CHUNK).map(|chunk| of_chunk(&mut scratch, chunk)).collect()
     };
-    for (more, lines, tests) in found {
+    counters.lines += meetings.len() as u64;
+    for (more, tests) in found {
         pieces.extend(more);
-        counters.lines += lines;
         counters.tests += tests;
     }
     add_sections(tracer, false, pieces, counters);
+}
+
+/// The meetings of the kinds that are wanted, each once.
+fn meetings(tracer: &Tracer, kinds: &Kinds, planes: &[Plane], parallel: bool) -> Vec<Meeting> {
+    if planes.is_empty() {
+        return Vec::new();
+    }
+    let of_band = |band: usize| {
+        let rows = tracer.occluders.grid.rows;
+        let rows = rows * band / BANDS..rows * (band + 1) / BANDS;
+        let mut found = Vec::new();
+        meetings_in_rows(tracer, planes, rows, &mut found);
+        found
+    };
+    let found: Vec<Vec<Meeting>> = if parallel {
+        (0..BANDS).into_par_iter().map(of_band).collect()
+    } else {
+        (0..BANDS).map(of_band).collect()
+    };
+    let mut known: HashSet<[u32; 2], Mix> = HashSet::default();
+    let mut all: Vec<Meeting> = found.into_iter().flatten().collect();
+    all.retain(|m| {
+        let wanted = if m.kind == Kind::Intersection { kinds.intersection } else { kinds.contact };
+        wanted && (!m.repeats || known.insert(m.triangles))
+    });
+    all
 }
 
 /// The outlines of cuts; also those by the view's range of depth, if they are wanted.
@@ -126,7 +148,7 @@ impl Plane {
     }
 }
 
-/// The meetings of pairs of triangles that share a cell of these rows, each once in all bands together.
+/// The meetings of pairs of triangles that share a cell of these rows, each once.
 fn meetings_in_rows(tracer: &Tracer, planes: &[Plane], rows: Range<usize>, found: &mut Vec<Meeting>) {
     let (shown, occluders) = (tracer.shown, tracer.occluders);
     let grid = &occluders.grid;
@@ -153,14 +175,11 @@ fn meetings_in_rows(tracer: &Tracer, planes: &[Plane], rows: Range<usize>, found
                     continue;
                 }
                 // Pairs share several cells. Small ones count in the cell where their boxes' overlap begins;
-                // a large one may not be in that cell, and counts in the band where the meeting's middle is.
+                // large ones are not in every cell, and count in each band once.
                 if first.large || second.large {
                     if known.insert((a, b)) {
-                        let meeting = meeting(shown, first.triangle, second.triangle).filter(|m| {
-                            let middle = shown.lens.project((m.ends[0] + m.ends[1]) * 0.5);
-                            rows.contains(&grid.row(middle.y))
-                        });
-                        found.extend(meeting);
+                        let meeting = meeting(shown, first.triangle, second.triangle);
+                        found.extend(meeting.map(|m| Meeting { repeats: true, ..m }));
                     }
                     continue;
                 }
@@ -210,7 +229,7 @@ fn meeting(shown: &Shown, a: u32, b: u32) -> Option<Meeting> {
     let passes = passes_through(shown, a, &sides_a, corners[1][0], n[1])
         && passes_through(shown, b, &sides_b, corners[0][0], n[0]);
     let kind = if passes { Kind::Intersection } else { Kind::Contact };
-    Some(Meeting { ends: of_a, kind, triangles: [a, b] })
+    Some(Meeting { ends: of_a, kind, triangles: [a, b], repeats: false })
 }
 
 /// On which side of a plane each corner is: a distance, or 0 within the tolerance. `None` if the triangle

@@ -1,5 +1,6 @@
 //! The triangles that may hide something, by cell of the grid, nearest first.
 
+use super::cover::Cover;
 use super::grid::{Grid, rectangle};
 use super::shown::{Fate, Shown};
 use glam::{DVec2, DVec3};
@@ -52,14 +53,16 @@ pub(super) fn outwards(min: DVec2, max: DVec2) -> [f32; 4] {
 
 impl Occluders {
     /// Sorts the live triangles of `shown` that `hides` says yes to.
-    pub fn new(shown: &Shown, grid: Grid, hides: impl Fn(u32) -> bool) -> Occluders {
+    /// Large ones are left out of cells where `cover` hides them.
+    pub fn new(shown: &Shown, grid: Grid, cover: Option<&Cover>, hides: impl Fn(u32) -> bool) -> Occluders {
         let live =
             (0..shown.triangles.len() as u32).filter(|&t| shown.fate[t as usize] == Fate::Live && hides(t));
         let mut list: Vec<Occluder> = live.map(|t| occluder(shown.corners(t), t, &grid)).collect();
         list.sort_unstable_by(|a, b| b.nearest.total_cmp(&a.nearest).then(a.triangle.cmp(&b.triangle)));
         let mut starts = vec![0u32; grid.len() + 1];
+        let hidden = |o: &Occluder, cell: usize| o.large && cover.is_some_and(|c| c.bound(cell) > o.nearest);
         for o in &list {
-            visit_cells(shown, &grid, o, |cell| starts[cell + 1] += 1);
+            visit_cells(shown, &grid, o, |cell| starts[cell + 1] += u32::from(!hidden(o, cell)));
         }
         for i in 1..starts.len() {
             starts[i] += starts[i - 1];
@@ -68,6 +71,9 @@ impl Occluders {
         let mut next = starts.clone();
         for (i, o) in list.iter().enumerate() {
             visit_cells(shown, &grid, o, |cell| {
+                if hidden(o, cell) {
+                    return;
+                }
                 entries[next[cell] as usize] = i as u32;
                 next[cell] += 1;
             });
@@ -82,7 +88,7 @@ impl Occluders {
     }
 }
 
-/// Calls `visit` for every cell that a triangle may touch.
+/// Calls `visit` for every cell that a triangle may touch. Errs towards yes.
 #[inline]
 fn visit_cells(shown: &Shown, grid: &Grid, o: &Occluder, mut visit: impl FnMut(usize)) {
     let min = DVec2::new(f64::from(o.min[0]), f64::from(o.min[1]));
@@ -90,12 +96,43 @@ fn visit_cells(shown: &Shown, grid: &Grid, o: &Occluder, mut visit: impl FnMut(u
     let cells = grid.cells(min, max);
     let corners = shown.corners(o.triangle);
     for row in cells.rows.0..=cells.rows.1 {
-        for column in cells.columns.0..=cells.columns.1 {
-            if !o.large || may_touch(&corners, grid, column, row) {
-                visit(grid.index(column, row));
-            }
+        let (first, last) = if o.large { columns_in_row(&corners, grid, row) } else { cells.columns };
+        for column in first..=last {
+            visit(grid.index(column, row));
         }
     }
+}
+
+/// The columns that a triangle touches in a row. The first and the last row stand for all beyond them.
+#[inline]
+fn columns_in_row(corners: &[DVec3; 3], grid: &Grid, row: usize) -> (usize, usize) {
+    let hair = grid.size * 1e-3;
+    let top = if row == 0 { f64::NEG_INFINITY } else { grid.origin.y + row as f64 * grid.size - hair };
+    let below = if row + 1 == grid.rows {
+        f64::INFINITY
+    } else {
+        grid.origin.y + (row + 1) as f64 * grid.size + hair
+    };
+    let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut previous = corners[2];
+    for &corner in corners {
+        let (low, high) = if previous.y <= corner.y { (previous, corner) } else { (corner, previous) };
+        previous = corner;
+        if high.y < top || low.y > below {
+            continue;
+        }
+        let slope = if high.y > low.y { (high.x - low.x) / (high.y - low.y) } else { 0.0 };
+        let at = |y: f64| low.x + (y - low.y) * slope;
+        let from = if low.y < top { at(top) } else { low.x };
+        let to = if high.y > below { at(below) } else { high.x };
+        left = left.min(from.min(to));
+        right = right.max(from.max(to));
+        if high.y == low.y {
+            left = left.min(high.x);
+            right = right.max(high.x);
+        }
+    }
+    (grid.column(left - hair), grid.column(right + hair))
 }
 
 fn occluder(corners: [DVec3; 3], triangle: u32, grid: &Grid) -> Occluder {
@@ -112,22 +149,4 @@ fn occluder(corners: [DVec3; 3], triangle: u32, grid: &Grid) -> Occluder {
         triangle,
         large,
     }
-}
-
-/// Whether a large triangle may touch a cell: no side of it has the whole cell beyond it. Errs towards yes.
-pub(super) fn may_touch(corners: &[DVec3; 3], grid: &Grid, column: usize, row: usize) -> bool {
-    let center = grid.center(column, row);
-    // The first and the last cells stand for all that is outside the grid.
-    if column == 0 || row == 0 || column + 1 == grid.columns || row + 1 == grid.rows {
-        return true;
-    }
-    let reach = grid.size * 0.501;
-    let p = corners.map(|c| c.truncate() - center);
-    let turn = (p[1] - p[0]).perp_dot(p[2] - p[0]).signum();
-    (0..3).all(|k| {
-        let d = p[(k + 1) % 3] - p[k];
-        let offset = turn * d.perp_dot(-p[k]);
-        let slack = 1e-12 * d.abs().max_element() * p[k].abs().max_element();
-        offset >= -reach * (d.x.abs() + d.y.abs()) - slack
-    })
 }
