@@ -53,7 +53,7 @@ pub(super) fn find(tracer: &Tracer, pieces: &[Piece], color: FaceColor) -> Vec<F
             faces.push(Face { part: group.part, triangle: of_mesh, cut: group.cut, color, contours });
         }
     }
-    faces.sort_by(|a, b| (a.part, a.cut, a.color).cmp(&(b.part, b.cut, b.color)));
+    faces.sort_by_key(|f| (f.part, f.cut, f.color));
     faces
 }
 
