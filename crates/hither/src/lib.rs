@@ -13,6 +13,7 @@ pub mod conventions;
 pub mod geometry;
 pub mod hidden_line;
 pub mod index;
+pub mod order;
 pub mod raster;
 pub mod reference;
 pub mod render;
