@@ -20,15 +20,17 @@ mod office;
 mod palette;
 mod spec;
 mod spheres;
+mod toothpicks;
 
 pub use spec::{KeyDefault, KeyInfo, WorldError, WorldInfo};
 
 use hither::geometry::Aabb;
+use hither::order::Known;
 use hither::scene::Scene;
 use spec::Values;
 
 static WORLDS: &[WorldInfo] =
-    &[office::INFO, boxcity::INFO, clutter::INFO, spheres::INFO, hills::INFO, lecture::INFO];
+    &[office::INFO, boxcity::INFO, clutter::INFO, spheres::INFO, hills::INFO, lecture::INFO, toothpicks::INFO];
 
 /// Generates the world that `spec` asks for, `NAME?key=value&…`. Keys left out take their defaults.
 ///
@@ -58,5 +60,14 @@ pub fn occludees(name: &str) -> Option<Vec<Aabb>> {
         "clutter" => Some(clutter::occludees()),
         "spheres" => Some(spheres::occludees()),
         _ => None,
+    }
+}
+
+/// What is known of the parts of a generated world, by the instances' numbers: pairs whose hulls meet and that
+/// have an order all the same. Empty for scenes that are not worlds, and for most that are.
+pub fn known_relations(scene: &Scene) -> Vec<(u32, u32, Known)> {
+    match scene.name.split('?').next() {
+        Some("toothpicks") => toothpicks::joints(),
+        _ => Vec::new(),
     }
 }

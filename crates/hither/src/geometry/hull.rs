@@ -26,7 +26,7 @@ const TOLERANCE: f64 = 1e-9;
 const MOST_CHECKS: usize = 40_000_000;
 
 /// A convex polyhedron, polygon, segment or point given by its extreme points.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Hull {
     vertices: Vec<DVec3>,
     /// Where each vertex's neighbours begin, and the end of the last; empty if vertices are looked at one by one.
@@ -34,8 +34,15 @@ pub struct Hull {
     neighbors: Vec<u32>,
     /// Outward, counter-clockwise; empty unless the hull has a volume.
     triangles: Vec<[u32; 3]>,
-    center: DVec3,
+    bounds: Aabb,
     radius: f64,
+}
+
+impl Default for Hull {
+    fn default() -> Self {
+        let (vertices, starts) = (Vec::new(), Vec::new());
+        Hull { vertices, starts, neighbors: Vec::new(), triangles: Vec::new(), bounds: Aabb::EMPTY, radius: 0.0 }
+    }
 }
 
 impl Hull {
@@ -70,8 +77,9 @@ impl Hull {
     }
 
     fn with_sphere(mut self) -> Hull {
-        self.center = Aabb::around(self.vertices.iter().copied()).center();
-        self.radius = self.vertices.iter().map(|v| v.distance(self.center)).fold(0.0, f64::max);
+        self.bounds = Aabb::around(self.vertices.iter().copied());
+        let center = self.center();
+        self.radius = self.vertices.iter().map(|v| v.distance(center)).fold(0.0, f64::max);
         self
     }
 
@@ -87,7 +95,12 @@ impl Hull {
 
     /// The centre of a sphere around it.
     pub fn center(&self) -> DVec3 {
-        self.center
+        self.bounds.center()
+    }
+
+    /// The smallest box around it, along its own axes.
+    pub fn bounds(&self) -> &Aabb {
+        &self.bounds
     }
 
     /// The radius of that sphere.
@@ -97,7 +110,8 @@ impl Hull {
 
     /// Volume, cubic metres; 0 for a flat one, and for one whose faces are not known.
     pub fn volume(&self) -> f64 {
-        let corner = |v: u32| self.vertices[v as usize] - self.center;
+        let center = self.center();
+        let corner = |v: u32| self.vertices[v as usize] - center;
         self.triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c))) / 6.0).sum()
     }
 
@@ -116,50 +130,51 @@ impl Hull {
     #[inline]
     pub fn climb(&self, direction: DVec3, start: u32) -> u32 {
         let height = |v: u32| self.vertices[v as usize].dot(direction);
-        self.ascend(start, height(start), height, |a, b| a > b)
-    }
-
-    /// The vertex where (x·p + x0) / (z·p + z0) is largest; z·p + z0 must be positive at every vertex.
-    #[inline]
-    pub fn climb_ratio(&self, x: (DVec3, f64), z: (DVec3, f64), start: u32) -> u32 {
-        let ratio = |v: u32| {
-            let p = self.vertices[v as usize];
-            DVec2::new(p.dot(x.0) + x.1, p.dot(z.0) + z.1)
-        };
-        // Quotients are compared crosswise, so that nothing is divided.
-        self.ascend(start, ratio(start), ratio, |a, b| a.x * b.y > b.x * a.y)
-    }
-
-    #[inline]
-    fn ascend<T: Copy>(
-        &self,
-        start: u32,
-        value: T,
-        of: impl Fn(u32) -> T,
-        above: impl Fn(T, T) -> bool,
-    ) -> u32 {
-        let (mut at, mut best) = (start, value);
+        let (mut at, mut best) = (start, height(start));
         if self.starts.is_empty() {
             for v in 0..self.vertices.len() as u32 {
-                let value = of(v);
-                if above(value, best) {
-                    (at, best) = (v, value);
+                let here = height(v);
+                if here > best {
+                    (at, best) = (v, here);
                 }
             }
             return at;
         }
         loop {
-            let here = at;
-            let ring = self.starts[here as usize] as usize..self.starts[here as usize + 1] as usize;
+            let from = at;
+            let ring = self.starts[from as usize] as usize..self.starts[from as usize + 1] as usize;
             for &v in &self.neighbors[ring] {
-                let value = of(v);
-                if above(value, best) {
-                    (at, best) = (v, value);
+                let here = height(v);
+                if here > best {
+                    (at, best) = (v, here);
                 }
             }
-            if at == here {
+            if at == from {
                 return at;
             }
+        }
+    }
+
+    /// The vertex where (x·p + x0) / (z·p + z0) is largest, and the quotient; z·p + z0 must be positive at every
+    /// vertex.
+    ///
+    /// Dinkelbach's method (1967): where q is the quotient at a vertex, a vertex with a larger one is one where
+    /// x·p + x0 − q (z·p + z0) is above zero, and that is climbed. From a good `start` the first climb stays
+    /// where it is, and costs what [`Hull::climb`] does.
+    #[inline]
+    pub fn climb_ratio(&self, x: (DVec3, f64), z: (DVec3, f64), start: u32) -> (u32, f64) {
+        let ratio = |v: u32| {
+            let p = self.vertices[v as usize];
+            (p.dot(x.0) + x.1) / (p.dot(z.0) + z.1)
+        };
+        let (mut at, mut best) = (start, ratio(start));
+        loop {
+            let next = self.climb(x.0 - z.0 * best, at);
+            let value = ratio(next);
+            if next == at || value <= best {
+                return (at, best);
+            }
+            (at, best) = (next, value);
         }
     }
 }
@@ -356,7 +371,8 @@ mod tests {
                 let (x, z) = ((d, 0.1 * scale), (DVec3::Z, 2.0 * scale));
                 let ratio = |p: DVec3| (p.dot(x.0) + x.1) / (p.dot(z.0) + z.1);
                 let best = points.iter().map(|&p| ratio(p)).fold(f64::NEG_INFINITY, f64::max);
-                let found = ratio(hull.vertices()[hull.climb_ratio(x, z, start) as usize]);
+                let (at, found) = hull.climb_ratio(x, z, start);
+                prop_assert_eq!(found, ratio(hull.vertices()[at as usize]));
                 prop_assert!((found - best).abs() <= 1e-8);
             }
         }

@@ -49,7 +49,8 @@ impl Body<'_> {
         if self.with_origin && point.dot(direction) <= 0.0 { DVec3::ZERO } else { point }
     }
 
-    fn center(&self) -> DVec3 {
+    /// Of the sphere around the hull, where the hull is.
+    pub fn center(&self) -> DVec3 {
         self.outer_from_hull.transform_point3(self.hull.center())
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! Without it, parts that occlude nothing stay where they are until one day they do, and must jump far. The
 //! paper orders by the midpoint along an extent; here by the distance of the centre, which means the same in
-//! every direction. A group moves before its predecessor if it is nearer and the extents rule out that the
-//! predecessor occludes it. It moves no farther than a bounded number of places in a frame: the next frame goes
+//! every direction. A group moves before its predecessor if it is nearer by more than its own size, and the extents
+//! rule out that the predecessor occludes it: a finer order would be upset by every motion and gain nothing. It moves no farther than a bounded number of places in a frame: the next frame goes
 //! on from there.
 
 use super::sort::VisibilitySort;
@@ -13,30 +13,43 @@ const PLACES: usize = 64;
 /// Groups with more pairs of members than this do not pass each other.
 const MOST_PAIRS: usize = 64;
 
+/// A run of the order.
+#[derive(Clone, Copy)]
+struct Group {
+    distance: f64,
+    /// Distance and size.
+    reach: f64,
+    from: u32,
+    end: u32,
+}
+
 impl VisibilitySort {
     pub(super) fn condition(&mut self) {
         let order = &self.order;
-        let distance = |g: &[u32]| self.parts[g[0] as usize].distance;
+        let key = |g: &[u32]| {
+            let part = &self.parts[g[0] as usize];
+            (part.distance, part.distance + part.radius)
+        };
         let mut sorted = true;
-        let mut groups: Vec<(f64, u32, u32)> = Vec::with_capacity(order.ends.len());
+        let mut groups: Vec<Group> = Vec::with_capacity(order.ends.len());
         let mut from = 0;
         for &end in &order.ends {
-            let key = distance(&order.parts[from as usize..end as usize]);
-            sorted &= groups.last().is_none_or(|last| last.0 <= key);
-            groups.push((key, from, end));
+            let (distance, reach) = key(&order.parts[from as usize..end as usize]);
+            sorted &= groups.last().is_none_or(|last| last.distance <= reach);
+            groups.push(Group { distance, reach, from, end });
             from = end;
         }
         if sorted {
             return;
         }
-        let members = |&(_, from, end): &(f64, u32, u32)| &order.parts[from as usize..end as usize];
+        let members = |g: &Group| &order.parts[g.from as usize..g.end as usize];
         let mut moved = 0;
         for i in 1..groups.len() {
             let group = groups[i];
             let mut to = i;
             while to > 0
                 && i - to < PLACES
-                && groups[to - 1].0 > group.0
+                && groups[to - 1].distance > group.reach
                 && !self.group_may_occlude(members(&groups[to - 1]), members(&group))
             {
                 groups[to] = groups[to - 1];
@@ -50,7 +63,7 @@ impl VisibilitySort {
         }
         let parts = groups.iter().flat_map(members).copied().collect();
         let mut end = 0;
-        let sizes = groups.iter().map(|g| g.2 - g.1);
+        let sizes = groups.iter().map(|g| g.end - g.from);
         self.order.ends = sizes
             .map(|size| {
                 end += size;

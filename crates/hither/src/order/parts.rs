@@ -2,7 +2,8 @@
 
 use super::sort::VisibilitySort;
 use crate::geometry::Hull;
-use crate::scene::{Instance, Scene};
+use crate::scene::{Instance, Mesh, Scene};
+use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 
 /// What becomes one part.
@@ -65,14 +66,23 @@ impl Parts {
         let instances = scene.instances();
         let mut found = Parts::default();
         let mut hull_of_mesh: HashMap<u32, Option<u32>> = HashMap::new();
+        let mut hull_of_points: HashMap<Vec<[u32; 3]>, u32> = HashMap::new();
         let mut part_of_owner: HashMap<Owner, usize> = HashMap::new();
         let mut used = vec![false; if let Granularity::Names(names) = granularity { names.len() } else { 0 }];
         let mut members: Vec<Vec<(u32, u32)>> = Vec::new();
         for (number, instance) in instances.iter().enumerate() {
             let hull = *hull_of_mesh.entry(instance.mesh).or_insert_with(|| {
-                let hull = mesh_hull(scene, instance.mesh)?;
-                found.hulls.push(hull);
-                Some(found.hulls.len() as u32 - 1)
+                // Meshes that differ in colour alone share a hull.
+                let points = used_points(&scene.meshes[instance.mesh as usize]);
+                let bits = points.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
+                if let Some(&same) = hull_of_points.get(&bits) {
+                    return Some(same);
+                }
+                let points: Vec<DVec3> = points.iter().map(|p| p.as_dvec3()).collect();
+                found.hulls.push(Hull::around(&points)?);
+                let number = found.hulls.len() as u32 - 1;
+                hull_of_points.insert(bits, number);
+                Some(number)
             });
             let Some(hull) = hull else {
                 found.empty_instances.push(number as u32);
@@ -128,14 +138,11 @@ impl Parts {
     }
 }
 
-/// The hull of what a mesh's triangles span; `None` without triangles.
-fn mesh_hull(scene: &Scene, mesh: u32) -> Option<Hull> {
-    let mesh = &scene.meshes[mesh as usize];
+/// The positions that a mesh's triangles use.
+fn used_points(mesh: &Mesh) -> Vec<Vec3> {
     let mut used = vec![false; mesh.positions.len()];
     mesh.triangles.as_flattened().iter().for_each(|&v| used[v as usize] = true);
-    let points: Vec<_> =
-        mesh.positions.iter().zip(used).filter(|(_, used)| *used).map(|(p, _)| p.as_dvec3()).collect();
-    Hull::around(&points)
+    mesh.positions.iter().zip(used).filter(|(_, used)| *used).map(|(p, _)| *p).collect()
 }
 
 /// What an instance belongs to: itself, or a node by its path through nested groups.

@@ -20,7 +20,7 @@
 //! whole O(n⁴). A group is never tested as a whole, so that it cannot grow through the empty space between its
 //! members (§5.3).
 
-use super::faces::{Faces, Summits};
+use super::faces::Faces;
 use super::known::{Known, Says};
 use super::pairs::{Pair, Pairs};
 use super::{Counters, Order, SortOptions};
@@ -36,7 +36,6 @@ pub struct VisibilitySort {
     pub(super) options: SortOptions,
     pub(super) hulls: Vec<Hull>,
     pub(super) pieces: Vec<Piece>,
-    summits: Vec<Summits>,
     pub(super) parts: Vec<PartState>,
     /// For each pair the other way round, too, with the roles said.
     known: HashMap<(u32, u32), (Known, bool)>,
@@ -54,12 +53,7 @@ pub(super) struct Piece {
     pub(super) part: u32,
     hull: u32,
     world_from_piece: DAffine3,
-    /// Relative to the eye of this frame.
-    pub(super) pose: DAffine3,
-    /// How much the pose magnifies at most.
-    stretch: f64,
-    /// Of a sphere around it, relative to the eye.
-    center: DVec3,
+    /// Of a sphere around it, metres.
     radius: f64,
 }
 
@@ -71,8 +65,17 @@ pub(super) struct PartState {
     /// Shown, and placed by finite numbers.
     pub(super) present: bool,
     has_known: bool,
-    /// Distance of its centre from the eye.
+    /// Distance of its nearest piece's centre from the eye.
     pub(super) distance: f64,
+    /// Of the sphere around that piece.
+    pub(super) radius: f64,
+}
+
+impl Piece {
+    #[inline]
+    fn relative_to(&self, eye: DVec3) -> DAffine3 {
+        DAffine3 { translation: self.world_from_piece.translation - eye, ..self.world_from_piece }
+    }
 }
 
 impl PartState {
@@ -128,12 +131,8 @@ impl VisibilitySort {
                 part,
                 hull,
                 world_from_piece: DAffine3::IDENTITY,
-                pose: DAffine3::IDENTITY,
-                stretch: 1.0,
-                center: DVec3::ZERO,
-                radius: 0.0,
+                radius: self.hulls[hull as usize].radius(),
             });
-            self.summits.push(Summits::default());
         }
         let end_piece = self.pieces.len() as u32;
         self.parts.push(PartState {
@@ -143,6 +142,7 @@ impl VisibilitySort {
             present: false,
             has_known: false,
             distance: 0.0,
+            radius: 0.0,
         });
         part
     }
@@ -166,7 +166,7 @@ impl VisibilitySort {
     pub fn place(&mut self, piece: u32, world_from_piece: DAffine3) {
         let piece = &mut self.pieces[piece as usize];
         if piece.world_from_piece.matrix3 != world_from_piece.matrix3 {
-            piece.stretch = stretch(&world_from_piece);
+            piece.radius = self.hulls[piece.hull as usize].radius() * stretch(&world_from_piece);
         }
         piece.world_from_piece = world_from_piece;
     }
@@ -227,17 +227,16 @@ impl VisibilitySort {
                 continue;
             }
             part.distance = f64::INFINITY;
-            for (piece, number) in pieces.iter_mut().zip(part.first_piece..) {
+            for (piece, number) in pieces.iter().zip(part.first_piece..) {
                 let hull = &self.hulls[piece.hull as usize];
-                piece.pose = piece.world_from_piece;
-                piece.pose.translation -= self.eye;
-                piece.center = piece.pose.transform_point3(hull.center());
-                piece.radius = hull.radius() * piece.stretch;
-                part.distance = part.distance.min(piece.center.length());
+                let pose = piece.relative_to(self.eye);
+                let center = pose.transform_point3(hull.center());
+                let distance = center.length();
+                if distance < part.distance {
+                    (part.distance, part.radius) = (distance, piece.radius);
+                }
                 self.alive[number as usize] = true;
-                let summits = &mut self.summits[number as usize];
-                let sphere = (piece.center, piece.radius);
-                self.faces.add(number, hull, &piece.pose, sphere, self.options.slack, summits);
+                self.faces.add(number, hull, &pose, (center, piece.radius), self.options.slack);
             }
         }
     }
@@ -360,22 +359,24 @@ impl VisibilitySort {
             }
         }
         self.counters.exact_tests += 1;
-        let body = |piece: &Piece, with_origin| {
-            let hull = &self.hulls[piece.hull as usize];
-            Body { hull, outer_from_hull: &self.pieces[if with_origin { pair.behind } else { pair.front } as usize].pose, with_origin }
-        };
-        let far = |piece: &Piece| piece.center.length() + piece.radius;
-        let margin = if self.options.slack > 0.0 { self.options.slack * far(front).min(far(behind)) } else { 0.0 };
-        !disjoint(&body(behind, true), &body(front, false), witness, margin)
+        let hull = |piece: &Piece| &self.hulls[piece.hull as usize];
+        let (front_pose, behind_pose) = (front.relative_to(self.eye), behind.relative_to(self.eye));
+        let shadow = Body { hull: hull(behind), outer_from_hull: &behind_pose, with_origin: true };
+        let body = Body { hull: hull(front), outer_from_hull: &front_pose, with_origin: false };
+        let mut margin = 0.0;
+        if self.options.slack > 0.0 {
+            let far = |body: &Body, radius: f64| body.center().length() + radius;
+            margin = self.options.slack * far(&shadow, behind.radius).min(far(&body, front.radius));
+        }
+        !disjoint(&shadow, &body, witness, margin)
     }
 
     /// Whether two pieces intersect, wherever the eye is.
     pub(super) fn intersect(&self, a: u32, b: u32) -> bool {
-        let body = |piece: u32| {
-            let piece = &self.pieces[piece as usize];
-            Body { hull: &self.hulls[piece.hull as usize], outer_from_hull: &piece.pose, with_origin: false }
-        };
-        !disjoint(&body(a), &body(b), &mut Witness::default(), 0.0)
+        let pose = |piece: u32| self.pieces[piece as usize].relative_to(self.eye);
+        let hull = |piece: u32| &self.hulls[self.pieces[piece as usize].hull as usize];
+        let body = |piece, pose| Body { hull: hull(piece), outer_from_hull: pose, with_origin: false };
+        !disjoint(&body(a, &pose(a)), &body(b, &pose(b)), &mut Witness::default(), 0.0)
     }
 
     fn count(&mut self) {
