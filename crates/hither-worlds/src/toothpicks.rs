@@ -13,8 +13,8 @@ use crate::spec::{KeyDefault, KeyInfo, Values, WorldInfo};
 use glam::{DQuat, DVec3, Vec4};
 use hither::order::Known;
 use hither::scene::{
-    Animation, Camera, CameraProjection, Channel, Content, Interpolation, Material, Mesh, Node, Primitive, Property,
-    Scene, Transform,
+    Animation, Camera, CameraProjection, Channel, Content, Interpolation, Material, Mesh, Node, Primitive,
+    Property, Scene, Transform,
 };
 use std::f64::consts::PI;
 
@@ -23,7 +23,13 @@ pub(crate) const INFO: WorldInfo = WorldInfo {
     description: "ellipsoids that tumble through each other in a cube of cylinders and spheres",
     keys: &[
         number("n", "toothpicks", 1, 1_000_000, 200),
-        number("density", "ud: uniform density, smaller ones where there are more; us: uniform scale", 0, 1, 0),
+        number(
+            "density",
+            "ud: uniform density, smaller ones where there are more; us: uniform scale",
+            0,
+            1,
+            0,
+        ),
         number("speed", "velocities are multiplied by this", 0, 1024, 1),
         number("slower", "and divided by this", 1, 1024, 1),
         number("frames", "length, sixtieths of a second", 1, 100_000, 250),
@@ -222,7 +228,8 @@ fn toothpick(
         content: Content::Mesh(mesh),
         ..Node::default()
     };
-    let mut bounces: Vec<f64> = (0..3).flat_map(|k| bounce_times(start[k], velocity[k], room, duration)).collect();
+    let mut bounces: Vec<f64> =
+        (0..3).flat_map(|k| bounce_times(start[k], velocity[k], room, duration)).collect();
     bounces.extend([0.0, duration]);
     bounces.sort_by(f64::total_cmp);
     let turns = (turning.abs() * duration / 1.0).ceil().max(1.0) as u32;

@@ -41,7 +41,14 @@ pub struct Hull {
 impl Default for Hull {
     fn default() -> Self {
         let (vertices, starts) = (Vec::new(), Vec::new());
-        Hull { vertices, starts, neighbors: Vec::new(), triangles: Vec::new(), bounds: Aabb::EMPTY, radius: 0.0 }
+        Hull {
+            vertices,
+            starts,
+            neighbors: Vec::new(),
+            triangles: Vec::new(),
+            bounds: Aabb::EMPTY,
+            radius: 0.0,
+        }
     }
 }
 

@@ -23,14 +23,28 @@ pub struct Body<'a> {
     pub with_origin: bool,
 }
 
-/// What is worth remembering of a pair: a direction that separates, or nearly does, and where on the bodies.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What is worth remembering of a pair: a direction that separates, or nearly does, and where on the bodies; of
+/// bodies that intersect a tetrahedron of the Minkowski difference around the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Witness {
     /// From the first body to the second; any length, zero if nothing is known.
     pub direction: [f32; 3],
     /// The vertices found last.
     pub vertices: [u32; 2],
+    /// For each corner of the tetrahedron a vertex of either body; [`ORIGIN`] stands for the origin. The first
+    /// corner of none is of two origins.
+    tetrahedron: [[u16; 2]; 4],
 }
+
+impl Default for Witness {
+    fn default() -> Self {
+        Witness { direction: [0.0; 3], vertices: [0; 2], tetrahedron: NO_TETRAHEDRON }
+    }
+}
+
+/// The origin among a body's vertices; also, a vertex whose number is too large to be remembered.
+const ORIGIN: u16 = u16::MAX;
+const NO_TETRAHEDRON: [[u16; 2]; 4] = [[ORIGIN; 2]; 4];
 
 /// Chung's directions that are tried before Gilbert's iteration.
 const CHUNG_STEPS: usize = 4;
@@ -42,11 +56,20 @@ const TOUCHING: f64 = 1e-12;
 impl Body<'_> {
     /// The farthest point along `direction`, from the vertex `hint` uphill.
     #[inline]
-    fn farthest(&self, direction: DVec3, hint: &mut u32) -> DVec3 {
+    fn farthest(&self, direction: DVec3, hint: &mut u32) -> (DVec3, u16) {
         let inner = self.outer_from_hull.matrix3.transpose() * direction;
         *hint = self.hull.climb(inner, *hint);
         let point = self.outer_from_hull.transform_point3(self.hull.vertices()[*hint as usize]);
-        if self.with_origin && point.dot(direction) <= 0.0 { DVec3::ZERO } else { point }
+        let is_origin = self.with_origin && point.dot(direction) <= 0.0;
+        if is_origin { (DVec3::ZERO, ORIGIN) } else { (point, u16::try_from(*hint).unwrap_or(ORIGIN)) }
+    }
+
+    /// The point that a corner of a remembered tetrahedron stands for.
+    fn corner(&self, number: u16) -> Option<DVec3> {
+        if number == ORIGIN {
+            return self.with_origin.then_some(DVec3::ZERO);
+        }
+        self.hull.vertices().get(usize::from(number)).map(|&v| self.outer_from_hull.transform_point3(v))
     }
 
     /// Of the sphere around the hull, where the hull is.
@@ -60,7 +83,10 @@ impl Body<'_> {
 /// `witness` says where to begin and is left as it is best for the next time. Cost: with a good witness two
 /// climbs, without one some ten.
 pub fn disjoint(a: &Body, b: &Body, witness: &mut Witness, margin: f64) -> bool {
-    let mut search = Search { a, b, hints: witness.vertices, margin, found: [DVec3::ZERO; 4], count: 0 };
+    if still_intersect(a, b, &witness.tetrahedron) {
+        return false;
+    }
+    let mut search = Search { a, b, hints: witness.vertices, margin, simplex: Simplex::default() };
     let mut direction = DVec3::from(witness.direction.map(f64::from));
     if direction == DVec3::ZERO {
         direction = first_guess(a, b);
@@ -68,7 +94,21 @@ pub fn disjoint(a: &Body, b: &Body, witness: &mut Witness, margin: f64) -> bool 
     let result = search.chung(&mut direction) || search.gilbert(&mut direction);
     witness.direction = direction.as_vec3().to_array();
     witness.vertices = search.hints;
+    witness.tetrahedron = search.simplex.around_origin.unwrap_or(NO_TETRAHEDRON);
     result
+}
+
+/// Whether the tetrahedron of the last time is around the origin again.
+fn still_intersect(a: &Body, b: &Body, tetrahedron: &[[u16; 2]; 4]) -> bool {
+    if tetrahedron[0] == [ORIGIN; 2] {
+        return false;
+    }
+    let mut corners = [DVec3::ZERO; 4];
+    for (corner, &[on_a, on_b]) in corners.iter_mut().zip(tetrahedron) {
+        let (Some(p), Some(q)) = (a.corner(on_a), b.corner(on_b)) else { return false };
+        *corner = q - p;
+    }
+    on_tetrahedron(corners).is_none()
 }
 
 /// For bodies seen from the origin: across the line of sight where they are beside each other.
@@ -86,32 +126,34 @@ struct Search<'a> {
     b: &'a Body<'a>,
     hints: [u32; 2],
     margin: f64,
-    /// Points of the Minkowski difference b − a.
-    found: [DVec3; 4],
-    count: usize,
+    simplex: Simplex,
 }
+
+/// A point of the Minkowski difference b − a, and the vertices it is of.
+type Difference = (DVec3, [u16; 2]);
 
 impl Search<'_> {
     /// The point of b − a that lies least far along `direction`, a unit vector.
     #[inline]
-    fn least(&mut self, direction: DVec3) -> DVec3 {
+    fn least(&mut self, direction: DVec3) -> Difference {
         let [on_a, on_b] = &mut self.hints;
-        self.b.farthest(-direction, on_b) - self.a.farthest(direction, on_a)
+        let (p, on_a) = self.a.farthest(direction, on_a);
+        let (q, on_b) = self.b.farthest(-direction, on_b);
+        (q - p, [on_a, on_b])
     }
 
     fn chung(&mut self, direction: &mut DVec3) -> bool {
         for _ in 0..CHUNG_STEPS {
             let Some(unit) = direction.try_normalize() else { return false };
             *direction = unit;
-            let least = self.least(unit);
+            let (least, of) = self.least(unit);
             if unit.dot(least) > self.margin {
                 return true;
             }
-            if self.found[..self.count].contains(&least) {
+            if self.simplex.holds(least) {
                 return false;
             }
-            self.found[self.count] = least;
-            self.count += 1;
+            self.simplex.add((least, of));
             let Some(along) = least.try_normalize() else { return false };
             *direction = unit - along * (2.0 * along.dot(unit));
         }
@@ -119,44 +161,48 @@ impl Search<'_> {
     }
 
     fn gilbert(&mut self, direction: &mut DVec3) -> bool {
-        let mut simplex = Simplex { points: self.found, count: self.count };
-        if simplex.count == 0 {
-            simplex.add(self.least(direction.try_normalize().unwrap_or(DVec3::X)));
+        if self.simplex.count == 0 {
+            let first = self.least(direction.try_normalize().unwrap_or(DVec3::X));
+            self.simplex.add(first);
         }
         let mut last = f64::INFINITY;
         for _ in 0..GILBERT_STEPS {
-            let Some(nearest) = simplex.reduce() else { return false };
-            let reach = simplex.reach();
+            let Some(nearest) = self.simplex.reduce() else { return false };
+            let reach = self.simplex.reach();
             let distance = nearest.length();
             if distance <= reach * TOUCHING || distance >= last {
                 return false;
             }
             last = distance;
             let unit = nearest / distance;
-            let least = self.least(unit);
+            let (least, of) = self.least(unit);
             *direction = unit;
             if unit.dot(least) > self.margin {
                 return true;
             }
             // No point lies nearer than the plane through `least`: the gap is known, and too small.
-            if distance - unit.dot(least) <= distance * 1e-10 || simplex.holds(least) {
+            if distance - unit.dot(least) <= distance * 1e-10 || self.simplex.holds(least) {
                 return false;
             }
-            simplex.add(least);
+            self.simplex.add((least, of));
         }
         false
     }
 }
 
 /// Up to four points, and the part of them whose hull is nearest to the origin.
+#[derive(Default)]
 struct Simplex {
     points: [DVec3; 4],
+    of: [[u16; 2]; 4],
     count: usize,
+    /// Set when the origin is found inside.
+    around_origin: Option<[[u16; 2]; 4]>,
 }
 
 impl Simplex {
-    fn add(&mut self, point: DVec3) {
-        self.points[self.count] = point;
+    fn add(&mut self, (point, of): Difference) {
+        (self.points[self.count], self.of[self.count]) = (point, of);
         self.count += 1;
     }
 
@@ -170,17 +216,23 @@ impl Simplex {
 
     /// Keeps the face nearest to the origin and returns its nearest point; `None` if the origin is inside.
     fn reduce(&mut self) -> Option<DVec3> {
-        let [a, b, c, d] = self.points;
+        let (points, of) = (self.points, self.of);
+        let [a, b, c, d] = points;
         let (kept, nearest) = match self.count {
             1 => (Face::of(&[0]), a),
             2 => on_segment([a, b], [0, 1]),
             3 => on_triangle([a, b, c], [0, 1, 2]),
-            _ => on_tetrahedron([a, b, c, d])?,
+            _ => match on_tetrahedron([a, b, c, d]) {
+                Some(face) => face,
+                None => {
+                    self.around_origin = Some(of);
+                    return None;
+                }
+            },
         };
-        let points = self.points;
         self.count = kept.count;
-        for (slot, &from) in self.points.iter_mut().zip(&kept.corners[..kept.count]) {
-            *slot = points[from];
+        for (slot, &from) in kept.corners[..kept.count].iter().enumerate() {
+            (self.points[slot], self.of[slot]) = (points[from], of[from]);
         }
         Some(nearest)
     }
@@ -224,15 +276,20 @@ fn on_triangle([a, b, c]: [DVec3; 3], [i, j, k]: [usize; 3]) -> (Face, DVec3) {
     if flat || edges.iter().any(|&([p, q], ..)| outside(p, q)) {
         let candidates = edges.map(|(ends, names, _)| on_segment(ends, names));
         let [first, rest @ ..] = candidates;
-        return rest
-            .into_iter()
-            .fold(first, |best, next| if next.1.length_squared() < best.1.length_squared() { next } else { best });
+        return rest.into_iter().fold(first, |best, next| {
+            if next.1.length_squared() < best.1.length_squared() { next } else { best }
+        });
     }
     (Face::of(&[i, j, k]), normal * (a.dot(normal) / normal.length_squared()))
 }
 
 fn on_tetrahedron([a, b, c, d]: [DVec3; 4]) -> Option<(Face, DVec3)> {
-    let faces = [([a, b, c], [0, 1, 2], d), ([a, c, d], [0, 2, 3], b), ([a, d, b], [0, 3, 1], c), ([b, d, c], [1, 3, 2], a)];
+    let faces = [
+        ([a, b, c], [0, 1, 2], d),
+        ([a, c, d], [0, 2, 3], b),
+        ([a, d, b], [0, 3, 1], c),
+        ([b, d, c], [1, 3, 2], a),
+    ];
     let mut best: Option<(Face, DVec3)> = None;
     for (corners, names, opposite) in faces {
         let [p, q, r] = corners;

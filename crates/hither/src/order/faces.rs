@@ -3,13 +3,13 @@
 //! Extents are those of [Snyder & Lengyel 1997, §5]: one spatial direction, the depth along the face's axis,
 //! and four angular ones, as tangents: across, up, and both diagonals of the face. They are those of the box
 //! around a hull in its own space, whose eight corners are projected side by side; that takes a tenth of the
-//! time of ten climbs on the hull ([`Extents`](super::Extents) does these), and what a corner of the box lets
-//! through costs an exact test. Where they measure angles around two axes and give up at the branch cut behind the eye, a cube has no
+//! time of ten climbs on the hull from the last frame's vertices, and what a corner of the box lets through costs
+//! an exact test: over 102,400 toothpicks 0.45 of them a part instead of 0.33, and half the time on the whole.
+//! Where they measure angles around two axes and give up at the branch cut behind the eye, a cube has no
 //! branch cut: a hull that reaches over an edge of the cube has an extent on both faces. The axes are the
 //! world's, so that turning the head changes nothing; only where the eye is counts.
 //!
-//! Instead of a kd-tree (there is one in [`KdTree`](super::KdTree), for comparison) each face has a grid whose
-//! cells list the extents over them by their nearest depth. It is made anew each frame in linear time. What is
+//! Instead of a kd-tree that is rebalanced from frame to frame (§5.2) each face has a grid whose cells list the extents over them by their nearest depth. It is made anew each frame in linear time. What is
 //! already in the output is skipped, and for good at a list's beginning: the query of an extent looks at what
 //! remains between its back and the eye, which is next to nothing if last frame's order still holds.
 
@@ -99,14 +99,7 @@ impl Faces {
     }
 
     /// Adds a piece, whose pose is relative to the eye. `slack` widens it, radians and share of depth.
-    pub(super) fn add(
-        &mut self,
-        piece: u32,
-        hull: &Hull,
-        pose: &DAffine3,
-        sphere: (DVec3, f64),
-        slack: f64,
-    ) {
+    pub(super) fn add(&mut self, piece: u32, hull: &Hull, pose: &DAffine3, sphere: (DVec3, f64), slack: f64) {
         let rows = pose.matrix3.transpose();
         for face in 0..6 {
             if !sphere_reaches(sphere.0, sphere.1 * (1.0 + PAD), face) {
@@ -119,10 +112,13 @@ impl Faces {
         }
     }
 
-    /// Sorts what was added and fills the grids.
-    pub(super) fn build(&mut self) {
+    /// Sorts what was added and fills the grids; without `grids` each face is a single cell.
+    pub(super) fn build(&mut self, grids: bool) {
         self.sort();
-        self.choose_side();
+        self.side = 1;
+        if grids {
+            self.choose_side();
+        }
         let cells = 6 * self.side * self.side;
         self.starts.clear();
         self.starts.resize(cells + 1, 0);

@@ -28,7 +28,9 @@ impl VisibilitySort {
         for f in self.parts[front as usize].pieces() {
             for b in self.parts[behind as usize].pieces() {
                 let pair = Pair { front: f as u32, behind: b as u32 };
-                if self.faces.may_occlude(pair.front, pair.behind) && self.occludes(pair, &mut Witness::default()) {
+                if self.faces.may_occlude(pair.front, pair.behind)
+                    && self.occludes(pair, &mut Witness::default())
+                {
                     return true;
                 }
             }
@@ -70,7 +72,8 @@ impl VisibilitySort {
     /// Pairs of parts whose hulls intersect, smaller number first, ascending: all of them, for two hulls that
     /// intersect occlude each other and so share a group. Cost: quadratic in the size of the groups.
     pub fn intersecting_pairs(&mut self) -> Vec<(u32, u32)> {
-        let groups: Vec<Vec<u32>> = self.order.groups().filter(|g| g.len() > 1).map(<[u32]>::to_vec).collect();
+        let groups: Vec<Vec<u32>> =
+            self.order.groups().filter(|g| g.len() > 1).map(<[u32]>::to_vec).collect();
         let mut found = Vec::new();
         for group in groups {
             for (i, &a) in group.iter().enumerate() {

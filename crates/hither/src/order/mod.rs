@@ -12,18 +12,23 @@
 //! Only the eye's position counts, not where it looks: the order holds all around.
 
 mod condition;
+mod extents;
 mod faces;
 mod graph;
+mod kd_tree;
 mod known;
 mod pairs;
 mod parts;
 mod sort;
+mod split;
 #[cfg(test)]
 mod tests;
 
+pub use extents::Direction;
 pub use known::Known;
 pub use parts::{Granularity, Part, Parts, PartsError};
 pub use sort::VisibilitySort;
+pub use split::{Seam, SplitBy, SplitMesh, split};
 
 /// What may be chosen about a sort.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,11 +40,26 @@ pub struct SortOptions {
     pub incremental: bool,
     /// Move what is near up in the order where it may, [Snyder & Lengyel 1997, §7].
     pub conditioning: bool,
+    /// How possible occluders are found. The order is the same, up to what it leaves open.
+    pub broad_phase: BroadPhase,
+}
+
+/// How possible occluders are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BroadPhase {
+    /// Grids on the faces of a cube around the eye, made anew each frame.
+    #[default]
+    Grids,
+    /// By depth along the faces' axes alone, with directions compared afterwards: what grids gain.
+    Depth,
+    /// A kd-tree over two angles and a depth, rebalanced from frame to frame, [Snyder & Lengyel 1997, §5.2]. Slack
+    /// is not in it: 0 only.
+    KdTree,
 }
 
 impl Default for SortOptions {
     fn default() -> Self {
-        SortOptions { slack: 0.0, incremental: true, conditioning: true }
+        SortOptions { slack: 0.0, incremental: true, conditioning: true, broad_phase: BroadPhase::Grids }
     }
 }
 

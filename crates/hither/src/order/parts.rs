@@ -1,10 +1,12 @@
 //! Parts of a scene: which instances belong together, and the hulls around them.
 
 use super::sort::VisibilitySort;
+use super::split::{SplitBy, split};
 use crate::geometry::Hull;
 use crate::scene::{Instance, Mesh, Scene};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::collections::HashMap;
+use std::ops::Range;
 
 /// What becomes one part.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -39,6 +41,8 @@ pub struct Parts {
     hulls: Vec<Hull>,
     /// For each piece its instance and its hull.
     pieces: Vec<(u32, u32)>,
+    /// Where each part's pieces end.
+    ends: Vec<u32>,
 }
 
 /// Why a scene has no such parts.
@@ -59,35 +63,41 @@ impl Parts {
     /// The parts of `scene`, and a hull for each mesh they show. Cost: the vertices of these meshes, and the
     /// instances.
     pub fn of(scene: &Scene, granularity: &Granularity) -> Result<Parts, PartsError> {
+        Parts::with_hulls(scene, granularity, 1)
+    }
+
+    /// As [`Parts::of`], with up to `hulls` hulls a mesh: a mesh that is not convex is divided where it is least so
+    /// ([`SplitBy::Adaptive`]) and the hulls are put around the pieces, until no surface is deeper inside its hull
+    /// than a hundredth of the mesh's size. What is drawn is not divided.
+    pub fn with_hulls(scene: &Scene, granularity: &Granularity, hulls: u32) -> Result<Parts, PartsError> {
         let count = scene.instance_count();
         if count > MOST_INSTANCES {
             return Err(PartsError::TooMany(count));
         }
         let instances = scene.instances();
         let mut found = Parts::default();
-        let mut hull_of_mesh: HashMap<u32, Option<u32>> = HashMap::new();
-        let mut hull_of_points: HashMap<Vec<[u32; 3]>, u32> = HashMap::new();
+        let mut hulls_of_mesh: HashMap<u32, Range<u32>> = HashMap::new();
+        let mut hulls_of_points: HashMap<Vec<[u32; 3]>, Range<u32>> = HashMap::new();
         let mut part_of_owner: HashMap<Owner, usize> = HashMap::new();
         let mut used = vec![false; if let Granularity::Names(names) = granularity { names.len() } else { 0 }];
         let mut members: Vec<Vec<(u32, u32)>> = Vec::new();
         for (number, instance) in instances.iter().enumerate() {
-            let hull = *hull_of_mesh.entry(instance.mesh).or_insert_with(|| {
-                // Meshes that differ in colour alone share a hull.
-                let points = used_points(&scene.meshes[instance.mesh as usize]);
-                let bits = points.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
-                if let Some(&same) = hull_of_points.get(&bits) {
-                    return Some(same);
-                }
-                let points: Vec<DVec3> = points.iter().map(|p| p.as_dvec3()).collect();
-                found.hulls.push(Hull::around(&points)?);
-                let number = found.hulls.len() as u32 - 1;
-                hull_of_points.insert(bits, number);
-                Some(number)
+            let mesh = &scene.meshes[instance.mesh as usize];
+            let around = hulls_of_mesh.entry(instance.mesh).or_insert_with(|| {
+                // Meshes that differ in colour alone share their hulls.
+                let corners = mesh.triangles.as_flattened().iter().map(|&v| mesh.positions[v as usize]);
+                let bits = corners.map(|p| p.to_array().map(f32::to_bits)).collect();
+                let add = || {
+                    let first = found.hulls.len() as u32;
+                    found.hulls.extend(hulls_around(mesh, hulls));
+                    first..found.hulls.len() as u32
+                };
+                hulls_of_points.entry(bits).or_insert_with(add).clone()
             });
-            let Some(hull) = hull else {
+            if around.start == around.end {
                 found.empty_instances.push(number as u32);
                 continue;
-            };
+            }
             let (owner, name) = owner(scene, instance, number, granularity, &mut used);
             let at = *part_of_owner.entry(owner).or_insert_with(|| {
                 found.parts.push(Part { name, ..Part::default() });
@@ -95,13 +105,16 @@ impl Parts {
                 found.parts.len() - 1
             });
             found.parts[at].instances.push(number as u32);
-            found.parts[at].triangles += scene.meshes[instance.mesh as usize].triangles.len() as u64;
-            members[at].push((number as u32, hull));
+            found.parts[at].triangles += mesh.triangles.len() as u64;
+            members[at].extend(around.clone().map(|hull| (number as u32, hull)));
         }
         if let (Granularity::Names(names), Some(at)) = (granularity, used.iter().position(|&u| !u)) {
             return Err(PartsError::UnknownName(names[at].clone()));
         }
-        found.pieces = members.concat();
+        for pieces in members {
+            found.pieces.extend(pieces);
+            found.ends.push(found.pieces.len() as u32);
+        }
         Ok(found)
     }
 
@@ -110,9 +123,8 @@ impl Parts {
         for hull in &self.hulls {
             sort.add_hull(hull.clone());
         }
-        let mut pieces = self.pieces.iter();
-        for part in &self.parts {
-            let hulls: Vec<u32> = pieces.by_ref().take(part.instances.len()).map(|&(_, hull)| hull).collect();
+        for part in 0..self.parts.len() {
+            let hulls: Vec<u32> = self.pieces_of(part).iter().map(|&(_, hull)| hull).collect();
             sort.add_part(&hulls);
         }
     }
@@ -130,19 +142,45 @@ impl Parts {
         }
     }
 
-    /// Vertices of all hulls of a part together, for measures of cost.
+    /// The corners of all hulls of a part, in world space. `instances` are those of the scene as it is posed.
+    pub fn hull_points(&self, part: usize, instances: &[Instance]) -> Vec<DVec3> {
+        let pieces = self.pieces_of(part).iter();
+        let corners = pieces.flat_map(|&(instance, hull)| {
+            let pose = instances[instance as usize].world_from_mesh;
+            self.hulls[hull as usize].vertices().iter().map(move |&v| pose.transform_point3(v))
+        });
+        corners.collect()
+    }
+
+    /// Faces of all hulls of a part together, for measures of cost.
     pub fn hull_triangles(&self, part: usize) -> usize {
-        let before: usize = self.parts[..part].iter().map(|p| p.instances.len()).sum();
-        let pieces = &self.pieces[before..before + self.parts[part].instances.len()];
-        pieces.iter().map(|&(_, hull)| self.hulls[hull as usize].triangles().len()).sum()
+        self.pieces_of(part).iter().map(|&(_, hull)| self.hulls[hull as usize].triangles().len()).sum()
+    }
+
+    fn pieces_of(&self, part: usize) -> &[(u32, u32)] {
+        let start = if part == 0 { 0 } else { self.ends[part - 1] };
+        &self.pieces[start as usize..self.ends[part] as usize]
     }
 }
 
+/// Up to `most` hulls around a mesh; none without triangles.
+fn hulls_around(mesh: &Mesh, most: u32) -> Vec<Hull> {
+    let bounds = mesh.bounds();
+    if most > 1 && !bounds.is_empty() {
+        let depth = 0.01 * bounds.size().length();
+        let split = split(mesh, &SplitBy::Adaptive { pieces: most, depth }, 0.0);
+        if split.pieces.len() > 1 {
+            return split.pieces.iter().filter_map(|piece| Hull::around(&used_points(piece))).collect();
+        }
+    }
+    Hull::around(&used_points(mesh)).into_iter().collect()
+}
+
 /// The positions that a mesh's triangles use.
-fn used_points(mesh: &Mesh) -> Vec<Vec3> {
+fn used_points(mesh: &Mesh) -> Vec<DVec3> {
     let mut used = vec![false; mesh.positions.len()];
     mesh.triangles.as_flattened().iter().for_each(|&v| used[v as usize] = true);
-    mesh.positions.iter().zip(used).filter(|(_, used)| *used).map(|(p, _)| *p).collect()
+    mesh.positions.iter().zip(used).filter(|(_, used)| *used).map(|(p, _)| p.as_dvec3()).collect()
 }
 
 /// What an instance belongs to: itself, or a node by its path through nested groups.

@@ -20,13 +20,16 @@
 //! whole O(n⁴). A group is never tested as a whole, so that it cannot grow through the empty space between its
 //! members (§5.3).
 
+use super::extents::Direction;
 use super::faces::Faces;
+use super::kd_tree::KdTree;
 use super::known::{Known, Says};
 use super::pairs::{Pair, Pairs};
-use super::{Counters, Order, SortOptions};
+use super::{BroadPhase, Counters, Order, SortOptions};
 use crate::geometry::{Body, Hull, Witness, disjoint};
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// Sorts parts front to back, frame after frame, and remembers what is worth remembering.
 ///
@@ -38,8 +41,9 @@ pub struct VisibilitySort {
     pub(super) pieces: Vec<Piece>,
     pub(super) parts: Vec<PartState>,
     /// For each pair the other way round, too, with the roles said.
-    known: HashMap<(u32, u32), (Known, bool)>,
+    known: HashMap<u64, (Known, bool), BuildHasherDefault<PairHasher>>,
     pub(super) faces: Faces,
+    tree: KdTree,
     pub(super) pairs: Pairs,
     pub(super) alive: Vec<bool>,
     search: Search,
@@ -62,6 +66,8 @@ pub(super) struct PartState {
     pub(super) first_piece: u32,
     pub(super) end_piece: u32,
     shown: bool,
+    /// Behind everything, whatever its hull says.
+    backdrop: bool,
     /// Shown, and placed by finite numbers.
     pub(super) present: bool,
     has_known: bool,
@@ -139,6 +145,7 @@ impl VisibilitySort {
             first_piece,
             end_piece,
             shown: true,
+            backdrop: false,
             present: false,
             has_known: false,
             distance: 0.0,
@@ -162,6 +169,22 @@ impl VisibilitySort {
         self.parts[part as usize].shown = shown;
     }
 
+    /// Says that a part is behind all others wherever the eye is, as a sky is: it comes last and occludes nothing.
+    pub fn set_backdrop(&mut self, part: u32, backdrop: bool) {
+        self.parts[part as usize].backdrop = backdrop;
+    }
+
+    /// The directions of the kd-tree's extents, any number of them; it is used with
+    /// [`BroadPhase::KdTree`] alone. Directions tied to a camera are set anew before each sort.
+    pub fn set_directions(&mut self, directions: &[Direction]) {
+        self.tree.set_directions(directions);
+    }
+
+    /// How often the kd-tree was built from nothing.
+    pub fn tree_builds(&self) -> u64 {
+        self.tree.builds
+    }
+
     /// Places a piece. A pose that is not finite takes the whole part out of the order while it lasts.
     pub fn place(&mut self, piece: u32, world_from_piece: DAffine3) {
         let piece = &mut self.pieces[piece as usize];
@@ -173,8 +196,8 @@ impl VisibilitySort {
 
     /// Says what is known of two parts; the later word counts.
     pub fn know(&mut self, first: u32, second: u32, known: Known) {
-        self.known.insert((first, second), (known, true));
-        self.known.insert((second, first), (known, false));
+        self.known.insert(pair_key(first, second), (known, true));
+        self.known.insert(pair_key(second, first), (known, false));
         self.parts[first as usize].has_known = true;
         self.parts[second as usize].has_known = true;
     }
@@ -187,7 +210,10 @@ impl VisibilitySort {
         self.counters = Counters::default();
         self.eye = eye;
         self.measure();
-        self.faces.build();
+        self.faces.build(self.options.broad_phase == BroadPhase::Grids);
+        if self.options.broad_phase == BroadPhase::KdTree {
+            self.tree.update();
+        }
         let roots = self.roots();
         self.pairs.turn(self.parts.len());
         self.search.begin(self.parts.len());
@@ -217,6 +243,10 @@ impl VisibilitySort {
     /// Finds the extents of everything that is shown.
     fn measure(&mut self) {
         self.faces.clear(self.pieces.len());
+        let with_tree = self.options.broad_phase == BroadPhase::KdTree;
+        if with_tree {
+            self.tree.clear(self.pieces.len());
+        }
         self.alive.clear();
         self.alive.resize(self.pieces.len(), false);
         for part in &mut self.parts {
@@ -227,6 +257,9 @@ impl VisibilitySort {
                 continue;
             }
             part.distance = f64::INFINITY;
+            if part.backdrop {
+                continue;
+            }
             for (piece, number) in pieces.iter().zip(part.first_piece..) {
                 let hull = &self.hulls[piece.hull as usize];
                 let pose = piece.relative_to(self.eye);
@@ -237,6 +270,9 @@ impl VisibilitySort {
                 }
                 self.alive[number as usize] = true;
                 self.faces.add(number, hull, &pose, (center, piece.radius), self.options.slack);
+                if with_tree {
+                    self.tree.add(number, hull, &pose);
+                }
             }
         }
     }
@@ -256,6 +292,9 @@ impl VisibilitySort {
         roots.extend((0..self.parts.len() as u32).filter(|&part| !is_old[part as usize] && present(part)));
         let distance = |part: &u32| self.parts[*part as usize].distance;
         roots[from..].sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        if self.parts.iter().any(|p| p.backdrop) {
+            roots.sort_by_key(|&part| self.parts[part as usize].backdrop);
+        }
         roots
     }
 
@@ -308,11 +347,17 @@ impl VisibilitySort {
         for behind in self.parts[part as usize].pieces() {
             let behind = behind as u32;
             let (pairs, pieces) = (&mut self.pairs.pairs, &self.pieces);
-            self.faces.occluders(behind, &self.alive, |front| {
+            let found = |front: u32| {
                 if pieces[front as usize].part != part {
                     pairs.push(Pair { front, behind });
                 }
-            });
+            };
+            match self.options.broad_phase {
+                BroadPhase::KdTree if self.alive[behind as usize] => {
+                    self.tree.occluders(behind, &self.alive, found);
+                }
+                _ => self.faces.occluders(behind, &self.alive, found),
+            }
         }
         let (next, end) = self.pairs.close(part, start);
         self.search.frames.push(Visit { part, next, end });
@@ -324,6 +369,9 @@ impl VisibilitySort {
         loop {
             let member = self.search.open.pop().expect("a component ends with the part that opened it");
             for piece in self.parts[member as usize].pieces() {
+                if self.options.broad_phase == BroadPhase::KdTree && self.alive[piece] {
+                    self.tree.deactivate(piece as u32);
+                }
                 self.alive[piece] = false;
             }
             self.order.parts.push(member);
@@ -350,7 +398,7 @@ impl VisibilitySort {
     pub(super) fn occludes(&mut self, pair: Pair, witness: &mut Witness) -> bool {
         let (front, behind) = (&self.pieces[pair.front as usize], &self.pieces[pair.behind as usize]);
         if self.parts[front.part as usize].has_known
-            && let Some(&(known, first)) = self.known.get(&(front.part, behind.part))
+            && let Some(&(known, first)) = self.known.get(&pair_key(front.part, behind.part))
         {
             match known.says(self.eye, first) {
                 Says::No => return false,
@@ -408,11 +456,35 @@ impl Search {
     }
 }
 
+fn pair_key(front: u32, behind: u32) -> u64 {
+    u64::from(front) << 32 | u64::from(behind)
+}
+
+/// Hashes a pair of parts by one multiplication: the numbers are our own, nobody chooses them to collide.
+#[derive(Default)]
+struct PairHasher(u64);
+
+impl Hasher for PairHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&b| self.write_u64(u64::from(b)));
+    }
+
+    fn write_u64(&mut self, key: u64) {
+        let product = u128::from(self.0 ^ key) * 0x9e37_79b9_7f4a_7c15_u128;
+        self.0 = (product >> 64) as u64 ^ product as u64;
+    }
+}
+
 /// An upper bound of how much a map stretches: its longest axis where the axes stand at right angles.
 fn stretch(map: &DAffine3) -> f64 {
     let m = map.matrix3;
     let lengths = [m.x_axis, m.y_axis, m.z_axis].map(|a| a.length_squared());
     let longest = lengths.iter().copied().fold(0.0, f64::max);
-    let skew = m.x_axis.dot(m.y_axis).abs().max(m.y_axis.dot(m.z_axis).abs()).max(m.z_axis.dot(m.x_axis).abs());
+    let skew =
+        m.x_axis.dot(m.y_axis).abs().max(m.y_axis.dot(m.z_axis).abs()).max(m.z_axis.dot(m.x_axis).abs());
     if skew <= 1e-9 * longest { longest.sqrt() * (1.0 + 1e-8) } else { lengths.iter().sum::<f64>().sqrt() }
 }

@@ -134,6 +134,16 @@ impl Stage {
 fn perform(seed: u64, frames: usize, spread: f64, options: SortOptions) -> usize {
     let mut random = Random(seed);
     let mut stage = Stage::new(options);
+    if seed.is_multiple_of(4) {
+        let (x, y) = (DVec3::new(0.6, 0.8, 0.0), DVec3::new(-0.8, 0.6, 0.0));
+        let angle = Direction::Angular { zero: x, positive: y };
+        stage.sort.set_directions(&[
+            Direction::Spatial(y),
+            angle,
+            Direction::Spatial(DVec3::Z),
+            Direction::Spatial(x),
+        ]);
+    }
     for _ in 0..3 + (random.unit() * 8.0) as usize {
         stage.add(&mut random, spread);
     }
@@ -162,12 +172,18 @@ fn perform(seed: u64, frames: usize, spread: f64, options: SortOptions) -> usize
 
 #[test]
 fn order_and_groups_are_those_of_brute_force_over_motion_jumps_insertions_and_removals() {
+    let phases = [BroadPhase::Grids, BroadPhase::KdTree, BroadPhase::Depth];
     let mut doubts = 0;
-    for seed in 0..40 {
-        let options = SortOptions { conditioning: seed % 3 != 0, incremental: seed % 5 != 0, slack: 0.0 };
+    for seed in 0..60 {
+        let options = SortOptions {
+            conditioning: seed % 3 != 0,
+            incremental: seed % 5 != 0,
+            broad_phase: phases[seed as usize % 7 % 3],
+            ..SortOptions::default()
+        };
         doubts += perform(seed, 25, [1.0, 2.0, 5.0, 20.0][seed as usize % 4], options);
     }
-    assert!(doubts < 20, "{doubts} of 1,000 frames were in doubt");
+    assert!(doubts < 20, "{doubts} of 1,500 frames were in doubt");
 }
 
 proptest! {
@@ -260,6 +276,26 @@ fn odd_parts_have_defined_answers() {
     assert_eq!(sort.intersecting_pairs(), [(2, 3)]);
     assert!(sort.sort(DVec3::NAN).parts().is_empty());
     assert_eq!(sort.sort(DVec3::ZERO).parts().len(), 4);
+}
+
+#[test]
+fn a_backdrop_around_everything_comes_last() {
+    let mut sort = VisibilitySort::new(SortOptions::default());
+    let cube: Vec<DVec3> = (0..8)
+        .map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) - 0.5)
+        .collect();
+    let hull = sort.add_hull(Hull::around(&cube).unwrap());
+    for scale in [100.0, 1.0, 1.0] {
+        let part = sort.add_part(&[hull]);
+        let at = DVec3::new(0.0, 0.0, -3.0 * f64::from(part));
+        sort.place(part, DAffine3::from_scale_rotation_translation(DVec3::splat(scale), DQuat::IDENTITY, at));
+    }
+    assert_eq!(sort.sort(DVec3::ZERO).groups().count(), 1);
+    sort.set_backdrop(0, true);
+    for _ in 0..2 {
+        let groups: Vec<Vec<u32>> = sort.sort(DVec3::ZERO).groups().map(<[u32]>::to_vec).collect();
+        assert_eq!(groups, [[1], [2], [0]]);
+    }
 }
 
 #[test]

@@ -98,7 +98,9 @@ fn detect_cycle(sequence: &[Element], relation: impl Fn(&Element, &Element) -> b
     let mut chain = vec![0];
     for _ in 0..=sequence.len() {
         let last = chain[chain.len() - 1];
-        if let Some(k) = chain[..chain.len() - 1].iter().position(|&i| relation(&sequence[i], &sequence[last])) {
+        if let Some(k) =
+            chain[..chain.len() - 1].iter().position(|&i| relation(&sequence[i], &sequence[last]))
+        {
             let mut cycle = chain[k..].to_vec();
             cycle.sort_unstable();
             return Some(cycle);

@@ -18,7 +18,9 @@ pub fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
     let mut best = f64::NEG_INFINITY;
     let mut attempt = |normal: DVec3| {
         if let Some(n) = normal.try_normalize() {
-            let reach = |points: &[DVec3], n: DVec3| points.iter().map(|p| p.dot(n)).fold(f64::NEG_INFINITY, f64::max);
+            let reach = |points: &[DVec3], n: DVec3| {
+                points.iter().map(|p| p.dot(n)).fold(f64::NEG_INFINITY, f64::max)
+            };
             best = best.max(-reach(b, -n) - reach(a, n)).max(-reach(a, -n) - reach(b, n));
         }
     };
@@ -49,9 +51,8 @@ pub fn components(n: usize, arcs: &[(u32, u32)]) -> Vec<Vec<u32>> {
     for via in 0..n {
         for from in 0..n {
             if reaches[from][via] {
-                for to in 0..n {
-                    reaches[from][to] |= reaches[via][to];
-                }
+                let beyond = reaches[via].clone();
+                reaches[from].iter_mut().zip(beyond).for_each(|(reached, b)| *reached |= b);
             }
         }
     }
