@@ -256,8 +256,8 @@ fn plane(scene: &mut Scene, number: u32, parts: &[AircraftPart], first: u32) -> 
 
 /// Where aircraft `i` is at `t`: in a wedge, weaving a little, along the valley.
 fn position(i: u32, t: f64) -> DVec3 {
-    let row = f64::from((i + 1) / 2);
-    let side = if i % 2 == 0 { 1.0 } else { -1.0 } * if i == 0 { 0.0 } else { 1.0 };
+    let row = f64::from(i.div_ceil(2));
+    let side = if i.is_multiple_of(2) { 1.0 } else { -1.0 } * if i == 0 { 0.0 } else { 1.0 };
     let phase = f64::from(i) * 1.7;
     let z = 380.0 - SPEED * t + row * 17.0;
     let x = middle(z) + side * row * 13.0 + 2.0 * libm::sin(t * 0.9 + phase);
