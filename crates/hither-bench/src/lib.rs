@@ -56,9 +56,9 @@ pub enum BenchError {
     },
 }
 
-/// Makes the table called `name`, or all of them.
+/// Makes the table called `name` and those called `name-…`, or all of them.
 pub fn run(name: Option<&str>, options: &Options) -> Result<Report, BenchError> {
-    let wanted: Vec<&TableInfo> = TABLES.iter().filter(|t| name.is_none_or(|n| n == t.name)).collect();
+    let wanted: Vec<&TableInfo> = TABLES.iter().filter(|t| name.is_none_or(|n| t.answers_to(n))).collect();
     if let (Some(name), true) = (name, wanted.is_empty()) {
         let known: Vec<&str> = TABLES.iter().map(|t| t.name).collect();
         return Err(BenchError::UnknownTable { name: name.to_owned(), known: known.join(", ") });

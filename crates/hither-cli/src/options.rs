@@ -100,6 +100,8 @@ impl WorkOptions {
         let algorithm = match self.algorithm {
             AlgorithmName::Hzb => Algorithm::Hzb,
             AlgorithmName::Zbuffer => Algorithm::ZBuffer,
+            // Each layer is drawn by it.
+            AlgorithmName::Layers => Algorithm::Hzb,
         };
         RenderOptions {
             algorithm,
@@ -126,12 +128,14 @@ impl WorkOptions {
 }
 
 /// `--algorithm`.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum AlgorithmName {
     /// Hierarchical z-buffer
     Hzb,
     /// Plain z-buffer: every triangle in the view
     Zbuffer,
+    /// Whole parts in order, each drawn alone and composited
+    Layers,
 }
 
 /// `--box-test`.

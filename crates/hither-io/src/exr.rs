@@ -3,8 +3,8 @@
 use crate::Error;
 use crate::atomic::write_whole;
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text,
-    WritableImage, f16,
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, ImageAttributes, Layer,
+    LayerAttributes, SmallVec, Text, Vec2, WritableImage, f16,
 };
 use hither::conventions::SurfaceId;
 use std::io::{self, Cursor};
@@ -77,6 +77,77 @@ fn encode(image: &ExrImage) -> io::Result<Vec<u8>> {
         other => io::Error::other(other.to_string()),
     })?;
     Ok(encoded.into_inner())
+}
+
+/// A named picture within a larger one, cut to what it covers.
+#[derive(Clone, Copy, Debug)]
+pub struct LayerPicture<'a> {
+    /// The layer's name; names need not differ.
+    pub name: &'a str,
+    /// Column and row of its top left pixel.
+    pub position: (u32, u32),
+    /// Width and height, pixels, perhaps 0.
+    pub size: (u32, u32),
+    /// Linear premultiplied RGBA, row by row.
+    pub pixels: &'a [[f32; 4]],
+    /// Whether a program that shows all layers over each other is to show it.
+    pub visible: bool,
+}
+
+/// Writes layers, front to back, as the parts of one EXR file, whole or not at all; `notes` become text attributes
+/// of the file. Parts are named `NNN name`, for EXR wants names to differ.
+pub fn write_exr_layers(
+    path: &Path,
+    (width, height): (u32, u32),
+    layers: &[LayerPicture],
+    notes: &[(&str, &str)],
+) -> Result<(), Error> {
+    let encoded = encode_layers((width, height), layers, notes).map_err(|source| Error::Io {
+        path: path.to_owned(),
+        action: "cannot encode",
+        source,
+    })?;
+    write_whole(path, |out| out.write_all(&encoded))
+}
+
+fn encode_layers(
+    (width, height): (u32, u32),
+    layers: &[LayerPicture],
+    notes: &[(&str, &str)],
+) -> io::Result<Vec<u8>> {
+    let part = |(number, layer): (usize, &LayerPicture)| {
+        // A part cannot be empty.
+        let empty = layer.pixels.is_empty();
+        let size = if empty { (1, 1) } else { (layer.size.0 as usize, layer.size.1 as usize) };
+        let pixels = if empty { &[[0.0; 4]][..] } else { layer.pixels };
+        let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
+        for (name, at) in [("R", 0), ("G", 1), ("B", 2), ("A", 3)] {
+            channels.push(channel(name, FlatSamples::F32(pixels.iter().map(|p| p[at]).collect())));
+        }
+        let name = format!("{number:03} {}", layer.name);
+        let mut attributes = LayerAttributes::named(text(&name));
+        attributes.layer_position = Vec2(layer.position.0 as i32, layer.position.1 as i32);
+        attributes.software_name = Some(Text::from(concat!("hither ", env!("CARGO_PKG_VERSION"))));
+        Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels))
+    };
+    let parts: Vec<_> = layers.iter().enumerate().map(part).collect();
+    let mut attributes = ImageAttributes::with_size((width as usize, height as usize));
+    for (name, value) in notes {
+        attributes.other.insert(text(name), AttributeValue::Text(text(value)));
+    }
+    let mut encoded = Cursor::new(Vec::new());
+    Image::from_layers(attributes, parts).write().to_buffered(&mut encoded).map_err(|error| match error {
+        exr::error::Error::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    })?;
+    Ok(encoded.into_inner())
+}
+
+/// Text without what EXR's one-byte characters cannot hold.
+fn text(value: &str) -> Text {
+    Text::new_or_none(value).unwrap_or_else(|| {
+        Text::from(value.chars().map(|c| if c.is_ascii() { c } else { '?' }).collect::<String>().as_str())
+    })
 }
 
 fn channel(name: &str, samples: FlatSamples) -> AnyChannel<FlatSamples> {

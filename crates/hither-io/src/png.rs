@@ -15,6 +15,11 @@ use std::path::Path;
 /// # Panics
 /// If the number of pixels is not `width * height`.
 pub fn write_png(path: &Path, width: u32, height: u32, pixels: &[[f32; 4]]) -> Result<(), Error> {
+    write_whole(path, |out| encode(out, width, height, pixels))
+}
+
+/// Writes a picture's bytes; see [`write_png`].
+pub(crate) fn encode(out: impl io::Write, width: u32, height: u32, pixels: &[[f32; 4]]) -> io::Result<()> {
     assert_eq!(
         pixels.len() as u64,
         u64::from(width) * u64::from(height),
@@ -22,16 +27,14 @@ pub fn write_png(path: &Path, width: u32, height: u32, pixels: &[[f32; 4]]) -> R
     );
     let opaque = pixels.iter().all(|p| alpha_code(p[3]) == 255);
     let samples = if opaque { rgb(pixels) } else { rgba(pixels) };
-    write_whole(path, |out| {
-        let mut encoder = png::Encoder::new(out, width, height);
-        encoder.set_color(if opaque { png::ColorType::Rgb } else { png::ColorType::Rgba });
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-        encoder.set_compression(png::Compression::Fast);
-        let mut writer = encoder.write_header().map_err(into_io)?;
-        writer.write_image_data(&samples).map_err(into_io)?;
-        writer.finish().map_err(into_io)
-    })
+    let mut encoder = png::Encoder::new(out, width, height);
+    encoder.set_color(if opaque { png::ColorType::Rgb } else { png::ColorType::Rgba });
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    encoder.set_compression(png::Compression::Fast);
+    let mut writer = encoder.write_header().map_err(into_io)?;
+    writer.write_image_data(&samples).map_err(into_io)?;
+    writer.finish().map_err(into_io)
 }
 
 fn into_io(error: png::EncodingError) -> io::Error {

@@ -1,8 +1,10 @@
 //! Images inside or beside a model, decoded to textures; a few bytes cannot ask for much memory.
 
-use hither::scene::Texture;
+use crate::Error;
+use hither::scene::{LINEAR_FROM_SRGB, Texture};
 use image::{ImageReader, Limits};
 use std::io::Cursor;
+use std::path::Path;
 
 /// The largest side of a texture, pixels.
 const MAX_SIDE: u32 = 16_384;
@@ -76,6 +78,23 @@ pub(crate) fn decode(name: &str, bytes: &[u8]) -> Result<Texture, String> {
     let decoded = decoder.decode().map_err(|e| one_line(&e))?.into_rgba8();
     let texels = decoded.as_raw().as_chunks::<4>().0.to_vec();
     Ok(Texture { name: name.to_owned(), width, height, texels })
+}
+
+/// Reads a PNG, JPEG or WebP picture: width, height, and linear premultiplied RGBA, row by row.
+pub fn read_picture(path: &Path) -> Result<(u32, u32, Vec<[f32; 4]>), Error> {
+    let bytes = std::fs::read(path).map_err(|source| Error::Io {
+        path: path.to_owned(),
+        action: "cannot read",
+        source,
+    })?;
+    let texture =
+        decode("picture", &bytes).map_err(|message| Error::Malformed { path: path.to_owned(), message })?;
+    let linear = |[r, g, b, a]: [u8; 4]| {
+        let alpha = f32::from(a) / 255.0;
+        let channel = |code: u8| LINEAR_FROM_SRGB[usize::from(code)] * alpha;
+        [channel(r), channel(g), channel(b), alpha]
+    };
+    Ok((texture.width, texture.height, texture.texels.into_iter().map(linear).collect()))
 }
 
 fn one_line(error: &image::ImageError) -> String {

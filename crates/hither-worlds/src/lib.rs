@@ -12,6 +12,7 @@
 
 mod benchmark_axes;
 mod boxcity;
+mod canyon;
 mod clutter;
 mod hills;
 mod lcg;
@@ -20,15 +21,25 @@ mod office;
 mod palette;
 mod spec;
 mod spheres;
+mod toothpicks;
 
 pub use spec::{KeyDefault, KeyInfo, WorldError, WorldInfo};
 
 use hither::geometry::Aabb;
+use hither::order::Known;
 use hither::scene::Scene;
 use spec::Values;
 
-static WORLDS: &[WorldInfo] =
-    &[office::INFO, boxcity::INFO, clutter::INFO, spheres::INFO, hills::INFO, lecture::INFO];
+static WORLDS: &[WorldInfo] = &[
+    office::INFO,
+    boxcity::INFO,
+    clutter::INFO,
+    spheres::INFO,
+    hills::INFO,
+    lecture::INFO,
+    toothpicks::INFO,
+    canyon::INFO,
+];
 
 /// Generates the world that `spec` asks for, `NAME?key=value&…`. Keys left out take their defaults.
 ///
@@ -58,5 +69,23 @@ pub fn occludees(name: &str) -> Option<Vec<Aabb>> {
         "clutter" => Some(clutter::occludees()),
         "spheres" => Some(spheres::occludees()),
         _ => None,
+    }
+}
+
+/// What is known of the parts of a generated world, by the instances' numbers: pairs whose hulls meet and that
+/// have an order all the same. Empty for scenes that are not worlds, and for most that are.
+pub fn known_relations(scene: &Scene) -> Vec<(u32, u32, Known)> {
+    match scene.name.split('?').next() {
+        Some("toothpicks") => toothpicks::joints(),
+        Some("canyon") => canyon::seams(&scene.name),
+        _ => Vec::new(),
+    }
+}
+
+/// Parts of a generated world, by the instances' numbers, that are behind everything: skies.
+pub fn backdrops(scene: &Scene) -> Vec<u32> {
+    match scene.name.split('?').next() {
+        Some("canyon") => vec![0],
+        _ => Vec::new(),
     }
 }

@@ -90,6 +90,14 @@ impl fmt::Display for KeyInfo {
     }
 }
 
+/// Words that may be written for a key's values, from 0.
+fn words(world: &str, key: &str) -> &'static [&'static str] {
+    match (world, key) {
+        ("toothpicks", "density") => crate::toothpicks::DENSITIES,
+        _ => &[],
+    }
+}
+
 pub(crate) fn unknown_world(name: &str, known: impl Iterator<Item = &'static str>) -> WorldError {
     WorldError::UnknownWorld { name: name.to_owned(), known: known.collect::<Vec<_>>().join(", ") }
 }
@@ -118,7 +126,11 @@ impl Values {
             if given[at].is_some() {
                 return Err(wrong("is the key's second value"));
             }
-            let number: u64 = value.parse().map_err(|_| wrong("is no whole number"))?;
+            let word = words(world.name, info.name).iter().position(|w| *w == value);
+            let number = match word {
+                Some(at) => at as u64,
+                None => value.parse().map_err(|_| wrong("is no whole number"))?,
+            };
             if !(info.min..=info.max).contains(&number) {
                 return Err(wrong("is out of range"));
             }

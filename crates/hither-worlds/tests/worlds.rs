@@ -215,3 +215,54 @@ fn every_world_is_valid_with_its_defaults_and_unknown_ones_are_named() {
     let fault = generate("ofice").map(drop).unwrap_err().to_string();
     assert!(fault.starts_with("there is no world \"ofice\"; there are office, boxcity"), "{fault}");
 }
+
+#[test]
+fn toothpicks_have_the_papers_parts_and_move_within_their_cube() {
+    let mut scene = world("toothpicks?n=200");
+    assert_eq!(scene.instance_count(), 220);
+    // 328 polygons: 16 triangles and 312 quadrilaterals.
+    assert_eq!(scene.meshes[2].triangles.len(), 16 + 2 * 312);
+    assert!((scene.animations[0].duration() - 250.0 / 60.0).abs() < 1e-6);
+    assert_eq!(hither_worlds::known_relations(&scene).len(), 24);
+    let (mut travelled, mut last) = (0.0, None);
+    for frame in 0..250 {
+        scene.pose(0, f64::from(frame) / 60.0);
+        let tips: Vec<DVec3> = scene.instances()[20..]
+            .iter()
+            .map(|i| i.world_from_mesh.transform_point3(DVec3::Y * 0.15))
+            .collect();
+        assert!(tips.iter().all(|t| t.abs().max_element() < 1.0), "frame {frame}");
+        if let Some(last) = last.replace(tips.clone()) {
+            travelled += tips.iter().zip(&last).map(|(a, b): (&DVec3, &DVec3)| a.distance(*b)).sum::<f64>();
+        }
+    }
+    // The paper: 0.269 % of the cube's side, 2 m, a frame.
+    let percent = travelled / (249.0 * 200.0) / 2.0 * 100.0;
+    assert!((0.24..0.30).contains(&percent), "{percent}");
+    let ud = world("toothpicks?n=1600").groups[0].nodes[30].local.matrix().matrix3.x_axis.length();
+    let us = world("toothpicks?n=1600&density=us").groups[0].nodes[30].local.matrix().matrix3.x_axis.length();
+    assert!((ud - 0.5).abs() < 1e-6 && (us - 1.0).abs() < 1e-6, "{ud} {us}");
+    assert!(generate("toothpicks?density=uu").is_err());
+}
+
+#[test]
+fn the_canyon_has_the_papers_polygons() {
+    for (grid, pieces) in [(20, 390.0), (14, 191.0), (10, 100.0), (7, 49.0), (5, 25.0)] {
+        let scene = world(&format!("canyon?grid={grid}"));
+        let names: Vec<&str> = scene.groups[0].nodes.iter().map(|n| n.name.as_str()).collect();
+        let found = names.iter().filter(|n| n.starts_with("terrain")).count() as f64;
+        assert!((found / pieces - 1.0).abs() < 0.05, "grid {grid}: {found} pieces");
+        assert_eq!(hither_worlds::backdrops(&scene), [0]);
+        assert!(!hither_worlds::known_relations(&scene).is_empty());
+    }
+    let scene = world("canyon?grid=1");
+    let counts =
+        [("sky", 480.0), ("terrain", 2473.0), ("body", 1558.0), ("engine", 1255.0), ("wing", 1421.0)];
+    let more = [("tail", 22.0), ("rudder", 48.0), ("hinge", 64.0)];
+    for (name, expected) in counts.into_iter().chain(more) {
+        let mesh = scene.meshes.iter().find(|m| m.name.starts_with(name)).unwrap();
+        let found = mesh.triangles.len() as f64;
+        assert!((found / expected - 1.0).abs() < 0.05, "{name}: {found}");
+    }
+    assert_eq!(scene.instance_count(), 2 + 36);
+}

@@ -4,7 +4,7 @@
 //! The crate opens no file, no device and no socket, and prints nothing; `hither-io` reads and writes files.
 //!
 //! Rooms, from the ground up (a room uses only rooms below it; `cargo xtask tidy` checks):
-//! [`conventions`], [`geometry`], [`scene`], [`index`] and [`raster`], [`render`](mod@render);
+//! [`conventions`], [`geometry`], [`scene`], [`index`] and [`raster`], [`order`], [`render`](mod@render), [`layers`];
 //! [`reference`](mod@reference) is the brute-force truth that every fast answer is tested against.
 #![forbid(unsafe_code)]
 
@@ -13,6 +13,8 @@ pub mod conventions;
 pub mod geometry;
 pub mod hidden_line;
 pub mod index;
+pub mod layers;
+pub mod order;
 pub mod raster;
 pub mod reference;
 pub mod render;

@@ -19,7 +19,7 @@ const FLOORS: &[(&str, u32)] = &[
     ("index", 4),
     ("cull", 5),
     ("order", 5),
-    ("layers", 6),
+    ("layers", 7),
     ("hidden_line", 6),
     ("antialias", 6),
     ("classic", 6),

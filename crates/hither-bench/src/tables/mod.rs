@@ -8,6 +8,7 @@ mod greene;
 mod growth;
 mod lines;
 mod load;
+mod order;
 mod scaling;
 mod simple;
 mod trees;
@@ -32,6 +33,11 @@ pub struct TableInfo {
 }
 
 impl TableInfo {
+    /// Whether `name` is its name or that of its family, which ends where a hyphen follows.
+    pub(crate) fn answers_to(&self, name: &str) -> bool {
+        self.name.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+    }
+
     pub(crate) fn make(&self, options: &Options) -> Result<Table, BenchError> {
         let mut table = Table::new(self.name, self.title, self.columns);
         (self.make)(&mut table, options).map_err(|fault| BenchError::Failed { table: self.name, fault })?;
@@ -53,6 +59,13 @@ pub static TABLES: &[TableInfo] = &[
     load::INFO,
     lines::INFO,
     lines::GROWTH,
+    order::OBJECTS,
+    order::BUILD,
+    order::COHERENCE,
+    order::EXTENTS,
+    order::STATISTICS,
+    order::CANYON,
+    order::RIVALS,
 ];
 
 const fn column(key: &'static str, title: &'static str, digits: usize) -> Column {

@@ -3,9 +3,12 @@
 mod bench;
 mod demo;
 mod info;
+mod layers;
 mod lines;
+mod order;
 mod render;
 mod report;
+mod sorting;
 mod world;
 
 use crate::failure::Failure;
@@ -22,6 +25,10 @@ pub enum Command {
     Render(Box<render::Arguments>),
     /// As a drawing
     Lines(Box<lines::Arguments>),
+    /// In what order?
+    Order(Box<order::Arguments>),
+    /// As separate images?
+    Layers(Box<layers::Arguments>),
     /// How fast, against what?
     Bench(bench::Arguments),
 }
@@ -33,6 +40,8 @@ pub fn run(command: Option<Command>) -> Result<(), Failure> {
         Some(Command::World(arguments)) => world::run(&arguments),
         Some(Command::Render(arguments)) => render::run(&arguments),
         Some(Command::Lines(arguments)) => lines::run(&arguments),
+        Some(Command::Order(arguments)) => order::run(&arguments),
+        Some(Command::Layers(arguments)) => layers::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         None => demo::run(),
     }

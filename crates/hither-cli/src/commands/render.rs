@@ -1,11 +1,13 @@
 //! `hither render`: pictures of a scene.
 
+mod layered;
+
 use super::report::{self, Seen};
 use crate::console::Verbosity;
 use crate::eye::Eye;
 use crate::failure::Failure;
 use crate::numbers::{grouped, short};
-use crate::options::{self, ReportOptions, ShadeName, ViewOptions, WorkOptions};
+use crate::options::{self, AlgorithmName, ReportOptions, ShadeName, ViewOptions, WorkOptions};
 use crate::outputs::{self, PictureFormat};
 use crate::source;
 use crate::timeline::Timeline;
@@ -154,7 +156,19 @@ impl Job<'_> {
         let path = if self.timeline.numbered { outputs::numbered(output, number) } else { output.clone() };
         let panel = self.arguments.shade.panel().and_then(|panel| complexity_image(frame, panel));
         let shading = self.arguments.shade.shading();
-        let mut image = panel.unwrap_or_else(|| shader.shade(scene, frame, shading));
+        let mut image = match panel {
+            Some(panel) => panel,
+            None if self.arguments.work.algorithm == AlgorithmName::Layers && shading.shows_blended() => {
+                layered::picture(
+                    scene,
+                    &self.arguments.scene,
+                    frame,
+                    shading,
+                    self.arguments.report.verbosity(),
+                )?
+            }
+            None => shader.shade(scene, frame, shading),
+        };
         if let Some(background) = self.arguments.background {
             put_behind(&mut image, background);
         }

@@ -5,10 +5,14 @@
 //! - [`zbuffer`] is the textbook z-buffer with the fill rule of `conventions`: a second witness that shares
 //!   nothing with the first but the scene, and the plain code that speed-ups are measured against.
 //! - [`lines`] samples the edges of a line drawing densely and casts a ray to each sample.
+//! - [`occlusion`] tells by brute force which convex body occludes which, and [`ivs`] sorts them step by step as
+//!   the incremental visibility sort was published.
 //! - [`trouble`] makes small scenes that lean towards trouble, for both and for everything else.
 
 mod caster;
+pub mod ivs;
 pub mod lines;
+pub mod occlusion;
 mod probe;
 pub mod trouble;
 pub mod zbuffer;

@@ -1,0 +1,361 @@
+//! `hither layers`: separate images, and the expression that composites them.
+
+mod focus;
+mod reuse;
+mod write;
+
+use super::report;
+use super::sorting::{PartOptions, Sorting};
+use crate::console::Verbosity;
+use crate::eye::Eye;
+use crate::failure::Failure;
+use crate::numbers::{count, grouped, short};
+use crate::options::{ReportOptions, ShadeName, ViewOptions};
+use crate::outputs;
+use crate::source;
+use crate::timeline::Timeline;
+use focus::FocusOptions;
+use hither::Scene;
+use hither::conventions::View;
+use hither::layers::{
+    Canvas, Component, Expression, LayerPainter, PaintOptions, Painted, Program, Sprite, decompose,
+};
+use hither::order::SortOptions;
+use hither::render::RenderOptions;
+use reuse::Reuse;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use write::Format;
+
+/// One image a layer, and the expression that composites them
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// A .glb, .gltf, .obj, .stl or .ply file, or a generated world, as in `world:toothpicks?n=200`
+    scene: String,
+    /// An OpenRaster file (.ora), an EXR file of several layers (.exr), or a folder of PNGs
+    #[arg(short, value_name = "FILE.ora|FILE.exr|DIR", required_unless_present = "json")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    parts: PartOptions,
+    /// How the layers are coloured
+    #[arg(long, value_name = "NAME", default_value = "smooth")]
+    shade: ShadeName,
+    /// Samples along each side of a pixel; with 1 the composite is the direct picture to the last bit
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=16))]
+    samples: u32,
+    /// Leave out layers that show, and so hide, nothing
+    #[arg(long)]
+    leave_out_empty: bool,
+    /// Composite without the layers that hold these parts; the others are not drawn anew
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    without: Vec<String>,
+    /// Composite with a picture of your own in place of the layer that holds a part
+    #[arg(long, value_name = "NAME=FILE")]
+    replace: Vec<String>,
+    /// Compare the composite with the picture drawn directly
+    #[arg(long)]
+    verify: bool,
+    /// With --frames: draw a layer anew only where its last picture, warped by an affine map, would be off by more
+    /// than so many pixels, and report how often that is, and how far off the pictures are
+    #[arg(long, value_name = "PIXELS", requires = "frames")]
+    reuse: Option<f64>,
+    #[command(flatten)]
+    focus: FocusOptions,
+    #[command(flatten)]
+    view: ViewOptions,
+    /// Worker threads; 0 is one for each core
+    #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u16).range(..=1024))]
+    threads: u16,
+    #[command(flatten)]
+    report: ReportOptions,
+}
+
+/// A frame taken apart.
+struct Taken {
+    components: Vec<Component>,
+    /// Through all components.
+    layers: Vec<Layer>,
+    expression: String,
+    program: Program,
+    composite: Canvas,
+}
+
+/// A layer and its picture.
+struct Layer {
+    name: String,
+    parts: Vec<u32>,
+    painted: Painted,
+    /// Left out of the composite.
+    out: bool,
+}
+
+/// Takes the frames apart that are asked for.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let verbosity = arguments.report.verbosity();
+    let to = arguments.report.json.as_deref();
+    let format = arguments.output.as_deref().map(Format::of).transpose()?;
+    check_outputs(arguments)?;
+    let mut scene = source::open(&arguments.scene, verbosity)?;
+    let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
+    timeline.pose_scene(&mut scene, timeline.frames.start);
+    let eye = Eye::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
+    let view = eye.view(&scene, arguments.view.size);
+    // Corners are rounded to 1/256 pixel, and depth to single precision.
+    let slack = 1.0 / (256.0 * view.pixels_per_unit()) + 1e-6;
+    let options = SortOptions { slack, ..SortOptions::default() };
+    let mut sorting = Sorting::new(&scene, &arguments.scene, &arguments.parts, options, verbosity)?;
+    let replacements = replacements(arguments, &sorting)?;
+    let mut painter = LayerPainter::new(&scene);
+    let paint = PaintOptions {
+        shading: arguments.shade.shading(),
+        samples: arguments.samples,
+        render: RenderOptions { threads: usize::from(arguments.threads), ..RenderOptions::default() },
+    };
+    let mut reuse = arguments.reuse.map(Reuse::new).transpose()?;
+    let mut frames = Vec::new();
+    for number in timeline.frames.clone() {
+        timeline.pose_scene(&mut scene, number);
+        painter.pose(&scene);
+        let view = eye.view(&scene, arguments.view.size);
+        let taken = take_apart(arguments, &scene, &view, &mut sorting, &mut painter, &paint, &replacements)?;
+        if let Some(reuse) = &mut reuse {
+            reuse.frame(&scene, &sorting, &view, &taken);
+        }
+        let output = arguments.output.as_ref().map(|path| match timeline.numbered {
+            true => outputs::numbered(path, number),
+            false => path.clone(),
+        });
+        let mut files = Vec::new();
+        if let (Some(output), Some(format)) = (&output, format) {
+            files = write::write(format, output, &taken, (view.width, view.height))?;
+        }
+        say(verbosity, &taken, output.as_deref(), timeline.numbered);
+        let check = match arguments.verify {
+            true => Some(verify(&taken, &view, &mut painter, &paint, verbosity)?),
+            false => None,
+        };
+        let focus =
+            focus::run(&arguments.focus, &taken, &view, &mut painter, &paint, output.as_deref(), verbosity)?;
+        if to.is_some() {
+            frames.push(frame_json(number, &taken, &files, check, focus));
+        }
+    }
+    let mut json = report::opening("layers");
+    json.insert("scene".into(), arguments.scene.as_str().into());
+    json.insert("width".into(), arguments.view.size.0.into());
+    json.insert("height".into(), arguments.view.size.1.into());
+    json.insert("parts".into(), sorting.parts_json());
+    if let Some(reuse) = &reuse {
+        verbosity.note(&reuse.line());
+        json.insert("reuse".into(), reuse.json());
+    }
+    json.insert("frames".into(), frames.into());
+    outputs::write_report(to, &json.into())
+}
+
+fn check_outputs(arguments: &Arguments) -> Result<(), Failure> {
+    if let (Some(output), Some(Format::OpenRaster | Format::Exr)) =
+        (&arguments.output, arguments.output.as_deref().map(Format::of).transpose()?)
+    {
+        hither_io::check_writable(output)?;
+    }
+    outputs::check_report(arguments.report.json.as_deref())
+}
+
+/// Parts by name, with the picture that takes the place of their layer.
+fn replacements(arguments: &Arguments, sorting: &Sorting) -> Result<Vec<(String, Option<Sprite>)>, Failure> {
+    let known = |name: &str| {
+        let found = (0..sorting.parts.parts.len() as u32).any(|p| sorting.name(p) == name);
+        let what = "`hither order` lists the names there are";
+        if found { Ok(name.to_owned()) } else { Err(Failure::work(format!("no part \"{name}\"; {what}"))) }
+    };
+    let mut all = Vec::new();
+    for name in &arguments.without {
+        all.push((known(name)?, None));
+    }
+    for replacement in &arguments.replace {
+        let Some((name, file)) = replacement.split_once('=') else {
+            return Err(Failure::usage(format!("--replace {replacement}: write NAME=FILE")));
+        };
+        let (width, height, pixels) = hither_io::read_picture(Path::new(file))?;
+        if (width, height) != arguments.view.size {
+            let (w, h) = arguments.view.size;
+            let what = format!("its size is {width}x{height}, the picture's {w}x{h}; make them the same");
+            return Err(Failure::work(format!("{file}: {what}")));
+        }
+        all.push((known(name)?, Some(Sprite::cut(width, &pixels))));
+    }
+    Ok(all)
+}
+
+fn take_apart(
+    arguments: &Arguments,
+    scene: &Scene,
+    view: &View,
+    sorting: &mut Sorting,
+    painter: &mut LayerPainter,
+    paint: &PaintOptions,
+    replacements: &[(String, Option<Sprite>)],
+) -> Result<Taken, Failure> {
+    sorting.sort(scene, view);
+    let order = sorting.sort.order().clone();
+    let mut components = decompose(&order, |group| sorting.sort.arcs_among(group));
+    let bar =
+        arguments.report.verbosity().bar(components.iter().map(|c| c.layers.len() as u64).sum(), "layers");
+    let mut layers = Vec::new();
+    for component in &mut components {
+        let mut kept = Vec::new();
+        for (at, parts) in component.layers.iter().enumerate() {
+            let instances =
+                parts.iter().flat_map(|&p| sorting.parts.parts[p as usize].instances.iter().copied());
+            let mut instances: Vec<u32> = instances.collect();
+            instances.sort_unstable();
+            let mut painted =
+                painter.paint(&instances, view, paint).map_err(|e| Failure::work(e.to_string()))?;
+            bar.inc(1);
+            let name = parts.iter().map(|&p| sorting.name(p)).collect::<Vec<_>>().join(" + ");
+            let replacement = replacements.iter().find(|(n, _)| parts.iter().any(|&p| sorting.name(p) == *n));
+            let mut out = false;
+            match replacement {
+                Some((_, Some(sprite))) => {
+                    painted.distances = vec![f32::INFINITY; sprite.pixels.len()];
+                    painted.sprite = sprite.clone();
+                }
+                Some((_, None)) => out = true,
+                None => {}
+            }
+            if arguments.leave_out_empty && painted.sprite.is_empty() {
+                continue;
+            }
+            kept.push(at as u32);
+            layers.push(Layer { name, parts: parts.clone(), painted, out });
+        }
+        keep(component, &kept);
+    }
+    bar.finish_and_clear();
+    components.retain(|c| !c.layers.is_empty());
+    let program = Program::compile(&components);
+    let expression = Expression::of(&components).text(&|l| quoted(&layers[l as usize].name));
+    let composite = program.run((view.width, view.height), |l| {
+        let layer = &layers[l as usize];
+        (!layer.out).then_some(&layer.painted.sprite)
+    });
+    Ok(Taken { components, layers, expression, program, composite })
+}
+
+/// Leaves only some of a component's layers.
+fn keep(component: &mut Component, kept: &[u32]) {
+    if kept.len() == component.layers.len() {
+        return;
+    }
+    let place = |old: u32| kept.iter().position(|&k| k == old).map(|at| at as u32);
+    component.arcs = component.arcs.iter().filter_map(|&(a, b)| Some((place(a)?, place(b)?))).collect();
+    component.layers = kept.iter().map(|&k| component.layers[k as usize].clone()).collect();
+}
+
+/// A name as the expression writes it: in quotes where it could be misread.
+fn quoted(name: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '.');
+    let is_word = matches!(name, "over" | "atop" | "out" | "in");
+    if !name.is_empty() && name.chars().all(plain) && !is_word {
+        return name.to_owned();
+    }
+    format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
+fn say(verbosity: Verbosity, taken: &Taken, output: Option<&Path>, numbered: bool) {
+    let several = taken.layers.iter().filter(|l| l.parts.len() > 1).count();
+    let cycles = taken.components.iter().filter(|c| c.layers.len() > 1).count();
+    let line = format!(
+        "{}, {} of several parts, {} composited without merging, {}",
+        count(taken.layers.len() as u64, "layer"),
+        several,
+        count(cycles as u64, "cycle"),
+        count(taken.program.instructions.len() as u64, "instruction"),
+    );
+    let wrote = output.map(|o| format!("wrote {}: ", o.display())).unwrap_or_default();
+    match numbered {
+        true => verbosity.detail(&format!("{wrote}{line}")),
+        false => verbosity.note(&format!("{wrote}{line}")),
+    }
+}
+
+/// How the composite differs from the direct picture.
+fn verify(
+    taken: &Taken,
+    view: &View,
+    painter: &mut LayerPainter,
+    paint: &PaintOptions,
+    verbosity: Verbosity,
+) -> Result<Value, Failure> {
+    let direct = painter.paint_all(view, paint).map_err(|e| Failure::work(e.to_string()))?.sprite;
+    let direct = direct.expanded(view.width, view.height);
+    let mut partial = vec![0u8; direct.len()];
+    for sprite in taken.layers.iter().map(|l| &l.painted.sprite) {
+        for (i, pixel) in sprite.pixels.iter().enumerate() {
+            if pixel[3] > 0.0 && pixel[3] < 1.0 {
+                let (x, y) = (sprite.x + i as u32 % sprite.width, sprite.y + i as u32 / sprite.width);
+                let count = &mut partial[(y * view.width + x) as usize];
+                *count = count.saturating_add(1);
+            }
+        }
+    }
+    let mut differing = 0u64;
+    // More than 1/255 off, where at most one, two, or more layers cover the pixel in part.
+    let mut beyond = [0u64; 3];
+    let mut largest = 0.0f32;
+    for ((a, b), partial) in taken.composite.pixels.iter().zip(&direct).zip(&partial) {
+        let off = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        differing += u64::from(a != b);
+        largest = largest.max(off);
+        if off > 1.0 / 255.0 {
+            beyond[usize::from((*partial).clamp(1, 3)) - 1] += 1;
+        }
+    }
+    let line = match differing {
+        0 => "the composite is the direct picture, bit for bit".to_owned(),
+        n => format!(
+            "{} pixels differ from the direct picture, by {} at most; off by more than 1/255: {} where one layer is \
+             partial, {} where two are, {} where more are",
+            grouped(n),
+            short(f64::from(largest)),
+            grouped(beyond[0]),
+            grouped(beyond[1]),
+            grouped(beyond[2])
+        ),
+    };
+    verbosity.note(&line);
+    Ok(json!({
+        "pixels_differing": differing,
+        "largest_difference": largest,
+        "beyond_one_in_255": { "one_partial": beyond[0], "two_partial": beyond[1], "more_partial": beyond[2] },
+    }))
+}
+
+fn frame_json(
+    number: u32,
+    taken: &Taken,
+    files: &[String],
+    check: Option<Value>,
+    focus: Option<Value>,
+) -> Value {
+    let layer = |(index, layer): (usize, &Layer)| {
+        let sprite = &layer.painted.sprite;
+        json!({
+            "index": index,
+            "name": layer.name,
+            "parts": layer.parts,
+            "file": files.get(index),
+            "left_out": layer.out,
+            "rectangle": [sprite.x, sprite.y, sprite.width, sprite.height],
+        })
+    };
+    json!({
+        "frame": number,
+        "layers": taken.layers.iter().enumerate().map(layer).collect::<Vec<_>>(),
+        "expression": taken.expression,
+        "program": write::program_json(&taken.program),
+        "verification": check,
+        "depth_of_field": focus,
+    })
+}

@@ -1,0 +1,101 @@
+//! Depth of field: layers blurred and composited, beside the blurred single picture and the truth.
+
+use super::Taken;
+use crate::console::Verbosity;
+use crate::failure::Failure;
+use crate::numbers::short;
+use hither::conventions::View;
+use hither::layers::depth_of_field::{
+    Lens, accumulate, blur_layer, blur_whole, lens_offsets, rms_difference, view_from,
+};
+use hither::layers::{Canvas, LayerPainter, PaintOptions, Sprite};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// A lens.
+#[derive(clap::Args, Debug)]
+pub struct FocusOptions {
+    /// Depth of field: distance in focus, metres. Writes the picture beside the layers, as NAME-focus.png
+    #[arg(long, value_name = "METRES", allow_hyphen_values = true, help_heading = "Lens")]
+    focus: Option<f64>,
+    /// The lens's f-number
+    #[arg(long, value_name = "N", default_value = "2.8", requires = "focus", help_heading = "Lens")]
+    f_number: f64,
+    /// The lens's focal length, millimetres
+    #[arg(long, value_name = "MM", default_value = "50", requires = "focus", help_heading = "Lens")]
+    focal_length: f64,
+    /// Also write the blurred single picture and the mean of N pictures from points of the lens, and compare
+    #[arg(long, value_name = "N", requires = "focus", help_heading = "Lens")]
+    lens_samples: Option<u32>,
+}
+
+/// Makes the pictures that are asked for; `None` if there is no lens.
+pub fn run(
+    options: &FocusOptions,
+    taken: &Taken,
+    view: &View,
+    painter: &mut LayerPainter,
+    paint: &PaintOptions,
+    output: Option<&Path>,
+    verbosity: Verbosity,
+) -> Result<Option<Value>, Failure> {
+    let Some(focus) = options.focus else { return Ok(None) };
+    let positive = |value: f64, name: &str| match value.is_finite() && value > 0.0 {
+        true => Ok(()),
+        false => Err(Failure::usage(format!("{name} {value}: write a number above 0"))),
+    };
+    positive(focus, "--focus")?;
+    positive(options.f_number, "--f-number")?;
+    positive(options.focal_length, "--focal-length")?;
+    let lens = Lens::of(focus, options.f_number, options.focal_length);
+    let size = (view.width, view.height);
+    let blurred: Vec<Sprite> = taken.layers.iter().map(|l| blur_layer(&l.painted, view, &lens)).collect();
+    let layered = taken.program.run(size, |l| (!taken.layers[l as usize].out).then(|| &blurred[l as usize]));
+    write(output, "focus", &layered, verbosity)?;
+    let Some(samples) = options.lens_samples else { return Ok(Some(json!({ "focus": focus }))) };
+    let draw = |painter: &mut LayerPainter, view: &View| {
+        painter.paint_all(view, paint).map_err(|e| Failure::work(e.to_string()))
+    };
+    let whole = draw(painter, view)?;
+    let single = blur_whole(&whole, view, &lens);
+    let sharp = Canvas { width: size.0, height: size.1, pixels: whole.sprite.expanded(size.0, size.1) };
+    let offsets = lens_offsets(view, &lens, samples as usize);
+    let mut pictures = Vec::with_capacity(offsets.len());
+    for (offset, shift) in &offsets {
+        let from = draw(painter, &view_from(view, *offset))?;
+        let pixels = from.sprite.expanded(size.0, size.1);
+        pictures.push((Canvas { width: size.0, height: size.1, pixels }, *shift));
+    }
+    let truth = accumulate(size, pictures.into_iter());
+    write(output, "focus-single", &single, verbosity)?;
+    write(output, "focus-truth", &truth, verbosity)?;
+    let errors = [&layered, &single, &sharp].map(|c| rms_difference(c, &truth));
+    verbosity.note(&format!(
+        "root mean square error against {} lens samples: layers {}, single picture {}, no blur {}",
+        offsets.len(),
+        short(errors[0]),
+        short(errors[1]),
+        short(errors[2])
+    ));
+    Ok(Some(json!({
+        "focus": focus,
+        "lens_samples": offsets.len(),
+        "rms_error_layers": errors[0],
+        "rms_error_single_picture": errors[1],
+        "rms_error_without_blur": errors[2],
+    })))
+}
+
+fn write(output: Option<&Path>, what: &str, picture: &Canvas, verbosity: Verbosity) -> Result<(), Failure> {
+    let Some(output) = output else { return Ok(()) };
+    let path: PathBuf = match output.is_dir() {
+        true => output.join(format!("{what}.png")),
+        false => {
+            let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+            output.with_file_name(format!("{stem}-{what}.png"))
+        }
+    };
+    hither_io::write_png(&path, picture.width, picture.height, &picture.pixels)?;
+    verbosity.note(&format!("wrote {}", path.display()));
+    Ok(())
+}

@@ -1,0 +1,144 @@
+//! `hither order` and `hither layers` as a user meets them.
+
+use serde_json::Value;
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+/// Spheres and cylinders of a frame, and a few toothpicks.
+const WORLD: &str = "world:toothpicks?n=30";
+
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Folder {
+        let path = std::env::temp_dir().join(format!("hither-layers-{name}-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).unwrap();
+        Folder(path)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).display().to_string()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn hither(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hither")).args(arguments).output().unwrap()
+}
+
+fn done(arguments: &[&str]) -> String {
+    let output = hither(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn report(arguments: &[&str]) -> Value {
+    serde_json::from_str(&done(arguments)).unwrap()
+}
+
+#[test]
+fn an_order_names_every_part_once_and_reports_what_it_did() {
+    let json = report(&["order", WORLD, "--frames", "0..3", "--fps", "60", "--arcs", "--json", "-", "-q"]);
+    assert_eq!(json["schema"], "hither.order/1");
+    assert_eq!(json["parts"].as_array().unwrap().len(), 50);
+    let frames = json["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 3);
+    for frame in frames {
+        let groups = frame["order"].as_array().unwrap();
+        let place =
+            |part: u64| groups.iter().position(|g| g.as_array().unwrap().contains(&part.into())).unwrap();
+        let mut parts: Vec<u64> =
+            groups.iter().flat_map(|g| g.as_array().unwrap()).map(|p| p.as_u64().unwrap()).collect();
+        parts.sort_unstable();
+        assert_eq!(parts, (0..50).collect::<Vec<u64>>());
+        for arc in frame["arcs"].as_array().unwrap() {
+            assert!(place(arc[0].as_u64().unwrap()) <= place(arc[1].as_u64().unwrap()));
+        }
+        assert!(frame["time_ms"].as_f64().unwrap() > 0.0 && frame["counters"]["parts"] == 50);
+    }
+    let names = done(&["order", WORLD, "-q"]);
+    assert!(names.contains("toothpick 7") && names.contains("sphere 0"));
+}
+
+#[test]
+fn the_graph_is_drawn_and_parts_are_chosen() {
+    let folder = Folder::new("graph");
+    let dot = folder.path("graph.dot");
+    done(&["order", WORLD, "--dot", &dot, "-q"]);
+    let text = fs::read_to_string(dot).unwrap();
+    assert!(text.starts_with("digraph") && text.contains(" -> ") && text.trim_end().ends_with('}'));
+    let json =
+        report(&["order", "world:canyon?grid=5", "--parts", "aircraft 0,aircraft 3", "--json", "-", "-q"]);
+    let names: Vec<&str> =
+        json["parts"].as_array().unwrap().iter().map(|p| p["name"].as_str().unwrap()).collect();
+    assert!(names.contains(&"aircraft 0") && names.contains(&"body 1") && !names.contains(&"body 0"));
+    let refused = hither(&["order", WORLD, "--parts", "nobody"]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("no node \"nobody\""));
+}
+
+#[test]
+fn layers_are_written_three_ways_and_restore_the_picture() {
+    let folder = Folder::new("ways");
+    for (output, file) in [("a.ora", "a.ora"), ("b.exr", "b.exr"), ("c", "c/composite.png")] {
+        let output = folder.path(output);
+        let json =
+            report(&["layers", WORLD, "-o", &output, "--size", "160x90", "--verify", "--json", "-", "-q"]);
+        let frame = &json["frames"][0];
+        assert_eq!(frame["verification"]["pixels_differing"], 0);
+        let layers = frame["layers"].as_array().unwrap();
+        let parts: usize = layers.iter().map(|l| l["parts"].as_array().unwrap().len()).sum();
+        assert_eq!(parts, 50);
+        assert!(frame["expression"].as_str().unwrap().contains(" over "));
+        let program = frame["program"].as_array().unwrap();
+        assert!(program.len() >= layers.len() && program[0]["register"].is_string());
+        assert!(fs::metadata(folder.path(file)).unwrap().len() > 500);
+    }
+    assert!(fs::read_to_string(folder.path("c/expression.txt")).unwrap().contains("\"sphere 0\""));
+    assert!(fs::read_to_string(folder.path("c/program.json")).unwrap().contains("Rover"));
+    let direct = folder.path("direct.png");
+    let layered = folder.path("layered.png");
+    done(&["render", WORLD, "-o", &direct, "--size", "160x90", "-q"]);
+    done(&["render", WORLD, "-o", &layered, "--size", "160x90", "--algorithm", "layers", "-q"]);
+    assert_eq!(fs::read(&direct).unwrap(), fs::read(&layered).unwrap());
+    assert_eq!(fs::read(&direct).unwrap(), fs::read(folder.path("c/composite.png")).unwrap());
+}
+
+#[test]
+fn layers_are_left_out_replaced_blurred_and_reused() {
+    let folder = Folder::new("more");
+    let whole = folder.path("whole");
+    done(&["layers", WORLD, "-o", &whole, "--size", "120x90", "-q"]);
+    let without = folder.path("without");
+    done(&["layers", WORLD, "-o", &without, "--size", "120x90", "--without", "sphere 7", "-q"]);
+    let composite = |folder: &str| fs::read(format!("{folder}/composite.png")).unwrap();
+    assert_ne!(composite(&whole), composite(&without));
+    let replaced = folder.path("replaced");
+    let picture = format!("sphere 7={whole}/composite.png");
+    done(&["layers", WORLD, "-o", &replaced, "--size", "120x90", "--replace", &picture, "-q"]);
+    assert_ne!(composite(&replaced), composite(&without));
+    let blurred = folder.path("blurred");
+    let lens = ["--focus", "4.8", "--f-number", "1", "--focal-length", "200", "--lens-samples", "20"];
+    let arguments = ["layers", WORLD, "-o", &blurred, "--size", "120x90", "--json", "-", "-q"];
+    let json = report(&[&arguments[..], &lens[..]].concat());
+    let errors = &json["frames"][0]["depth_of_field"];
+    let error = |name: &str| errors[name].as_f64().unwrap();
+    assert!(error("rms_error_layers") < error("rms_error_without_blur"), "{errors}");
+    assert!(fs::metadata(format!("{blurred}/focus.png")).unwrap().len() > 500);
+    let reuse = [
+        "layers", WORLD, "--size", "120x90", "--frames", "0..6", "--fps", "60", "--reuse", "1", "--json",
+        "-", "-q",
+    ];
+    let json = report(&reuse);
+    let rate = json["reuse"]["update_rate_unit"].as_f64().unwrap();
+    assert!((0.0..0.9).contains(&rate), "{rate}");
+    let refused = hither(&["layers", WORLD, "-o", &folder.path("x.ora"), "--focus", "0"]);
+    assert_eq!(refused.status.code(), Some(2));
+}

@@ -1,0 +1,154 @@
+//! Drawing layers: some instances of a scene as if the others were not there.
+//!
+//! The scene is flattened once and indexed once. For each layer its instances are put in their places and the
+//! last layer's are shrunk to a point behind the eye, so that nothing is built anew. Instances keep their
+//! numbers, ties in depth are decided as in the whole picture, and a layer's pixels are the whole picture's to
+//! the last bit wherever it is in front.
+
+use super::sprite::Sprite;
+use crate::conventions::{View, ViewError};
+use crate::index::{IndexOptions, SceneIndex};
+use crate::render::{RenderOptions, Renderer, Shader, Shading};
+use crate::scene::{Content, Group, Node, Scene, Transform};
+use glam::{DAffine3, DMat3};
+
+/// How layers are drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct PaintOptions {
+    /// Colours; smooth by default.
+    pub shading: Shading,
+    /// Samples along each side of a pixel; with more than 1 edges are antialiased by coverage.
+    pub samples: u32,
+    /// How visibility is found.
+    pub render: RenderOptions,
+}
+
+impl Default for PaintOptions {
+    fn default() -> Self {
+        PaintOptions { shading: Shading::Smooth, samples: 1, render: RenderOptions::default() }
+    }
+}
+
+/// A layer's picture.
+#[derive(Clone, Debug, Default)]
+pub struct Painted {
+    /// Cut to what it covers.
+    pub sprite: Sprite,
+    /// For each pixel of the sprite the mean distance along the view axis of what it shows that is opaque,
+    /// metres; +∞ where there is nothing.
+    pub distances: Vec<f32>,
+}
+
+/// Draws some of a scene's instances at a time.
+#[derive(Debug)]
+pub struct LayerPainter {
+    index: SceneIndex,
+    renderer: Renderer,
+    shader: Shader,
+    poses: Vec<DAffine3>,
+    shown: Vec<u32>,
+}
+
+impl LayerPainter {
+    /// Prepares to draw instances of `scene` in its present pose. Cost: a copy and an index of it.
+    pub fn new(scene: &Scene) -> LayerPainter {
+        let instances = scene.instances();
+        let poses: Vec<DAffine3> = instances.iter().map(|i| i.world_from_mesh).collect();
+        let node = |i: &crate::scene::Instance| Node {
+            local: Transform::Affine(hidden(&DAffine3::IDENTITY)),
+            content: Content::Mesh(i.mesh),
+            ..Node::default()
+        };
+        let nodes = instances.iter().map(node).collect();
+        let flat = Scene {
+            groups: vec![Group { name: String::new(), nodes }],
+            root: 0,
+            cameras: Vec::new(),
+            animations: Vec::new(),
+            name: scene.name.clone(),
+            meshes: scene.meshes.clone(),
+            materials: scene.materials.clone(),
+            textures: scene.textures.clone(),
+        };
+        let shader = Shader::new(&flat, 0);
+        let index = SceneIndex::build(flat, &IndexOptions::default());
+        LayerPainter { index, renderer: Renderer::new(), shader, poses, shown: Vec::new() }
+    }
+
+    /// Follows the scene to another pose; it must be the same scene otherwise.
+    pub fn pose(&mut self, scene: &Scene) {
+        self.poses = scene.instances().iter().map(|i| i.world_from_mesh).collect();
+    }
+
+    /// Draws `instances` alone. Memory while it works: some hundred bytes a sample.
+    pub fn paint(
+        &mut self,
+        instances: &[u32],
+        view: &View,
+        options: &PaintOptions,
+    ) -> Result<Painted, ViewError> {
+        let gone = hidden(&view.view_from_world.inverse());
+        for instance in std::mem::take(&mut self.shown) {
+            self.index.set_transform(instance, Transform::Affine(gone));
+        }
+        for &instance in instances {
+            self.index.set_transform(instance, Transform::Affine(self.poses[instance as usize]));
+        }
+        self.shown = instances.to_vec();
+        let samples = options.samples.max(1);
+        let fine = View { width: view.width * samples, height: view.height * samples, ..*view };
+        let frame = self.renderer.render(&self.index, &fine, &options.render)?;
+        let image = self.shader.shade(self.index.scene(), &frame, options.shading);
+        let pixels = reduced(&image.pixels, fine.width, samples);
+        let sprite = Sprite::cut(view.width, &pixels);
+        let mean = |x: u32, y: u32| {
+            let all = (0..samples * samples).map(|i| (x * samples + i % samples, y * samples + i / samples));
+            let (mut sum, mut count) = (0.0, 0);
+            for distance in all.map(|(x, y)| frame.distance(x, y)).filter(|d| d.is_finite()) {
+                (sum, count) = (sum + distance, count + 1);
+            }
+            if count > 0 { (sum / f64::from(count)) as f32 } else { f32::INFINITY }
+        };
+        let rows = sprite.y..sprite.y + sprite.height;
+        let distances = rows
+            .flat_map(|y| (sprite.x..sprite.x + sprite.width).map(move |x| (x, y)))
+            .map(|(x, y)| mean(x, y));
+        let painted = Painted { distances: distances.collect(), sprite };
+        self.renderer.recycle(frame);
+        Ok(painted)
+    }
+
+    /// Draws everything: what the composite is compared with.
+    pub fn paint_all(&mut self, view: &View, options: &PaintOptions) -> Result<Painted, ViewError> {
+        let all: Vec<u32> = (0..self.poses.len() as u32).collect();
+        self.paint(&all, view, options)
+    }
+}
+
+/// Everything shrunk to a point half a metre behind the eye.
+fn hidden(world_from_view: &DAffine3) -> DAffine3 {
+    let behind = world_from_view.transform_point3(glam::DVec3::new(0.0, 0.0, 0.5));
+    DAffine3 { matrix3: DMat3::ZERO, translation: behind }
+}
+
+/// The mean of each square of `samples` × `samples` pixels; the picture itself where that is one.
+fn reduced(pixels: &[[f32; 4]], width: u32, samples: u32) -> Vec<[f32; 4]> {
+    if samples == 1 {
+        return pixels.to_vec();
+    }
+    let (n, w) = (samples as usize, width as usize);
+    let share = 1.0 / (n * n) as f64;
+    let rows = pixels.chunks_exact(w * n);
+    rows.flat_map(|rows| {
+        (0..w / n).map(move |x| {
+            let mut sum = [0.0f64; 4];
+            for y in 0..n {
+                for p in &rows[y * w + x * n..y * w + (x + 1) * n] {
+                    sum.iter_mut().zip(p).for_each(|(s, c)| *s += f64::from(*c));
+                }
+            }
+            sum.map(|s| (s * share) as f32)
+        })
+    })
+    .collect()
+}

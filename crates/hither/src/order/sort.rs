@@ -1,0 +1,490 @@
+//! The incremental visibility sort.
+//!
+//! [Snyder & Lengyel 1997, §4] take the parts in last frame's order, put a part out when nothing that remains
+//! occludes it, push it back behind its farthest occluder otherwise, and look for a cycle among the parts that
+//! were pushed back. Here each part is visited in last frame's order, too, but its occluders are put out
+//! *first*, by depth-first search, and the cycles are the strongly connected components that Tarjan's algorithm
+//! (1972) finds on the way, in the order in which they must come:
+//!
+//! ```text
+//! for each part A in last frame's order, if it is not out yet: visit(A)
+//! visit(A): for each part B that is not out and may occlude A:      (extents, on a grid)
+//!               if B has not been visited and occludes A: visit(B)  (exact test)
+//!               if B is being visited and occludes A: they are in one cycle
+//!           if A closes a component: put it out, and take its parts out of the grid
+//! ```
+//!
+//! If the old order still holds, every query comes back empty and nothing is pushed anywhere. Each part is asked
+//! for its occluders once, whatever happens; an arc is tested only while both ends remain, and only if it can
+//! still change the answer. So the work is linear in the candidates; the paper's search is quadratic, and the
+//! whole O(n⁴). A group is never tested as a whole, so that it cannot grow through the empty space between its
+//! members (§5.3).
+
+use super::extents::Direction;
+use super::faces::Faces;
+use super::kd_tree::KdTree;
+use super::known::{Known, Says};
+use super::pairs::{Pair, Pairs};
+use super::{BroadPhase, Counters, Order, SortOptions};
+use crate::geometry::{Body, Hull, Witness, disjoint};
+use glam::{DAffine3, DVec3};
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
+/// Sorts parts front to back, frame after frame, and remembers what is worth remembering.
+///
+/// Parts are numbered in the order in which they are added, and so are their pieces; numbers are not used again.
+#[derive(Debug, Default)]
+pub struct VisibilitySort {
+    pub(super) options: SortOptions,
+    pub(super) hulls: Vec<Hull>,
+    pub(super) pieces: Vec<Piece>,
+    pub(super) parts: Vec<PartState>,
+    /// For each pair the other way round, too, with the roles said.
+    known: HashMap<u64, (Known, bool), BuildHasherDefault<PairHasher>>,
+    pub(super) faces: Faces,
+    tree: KdTree,
+    pub(super) pairs: Pairs,
+    pub(super) alive: Vec<bool>,
+    search: Search,
+    pub(super) order: Order,
+    pub(super) counters: Counters,
+    pub(super) eye: DVec3,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    pub(super) part: u32,
+    hull: u32,
+    world_from_piece: DAffine3,
+    /// Of a sphere around it, metres.
+    radius: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PartState {
+    pub(super) first_piece: u32,
+    pub(super) end_piece: u32,
+    shown: bool,
+    /// Behind everything, whatever its hull says.
+    backdrop: bool,
+    /// Shown, and placed by finite numbers.
+    pub(super) present: bool,
+    has_known: bool,
+    /// Distance of its nearest piece's centre from the eye.
+    pub(super) distance: f64,
+    /// Of the sphere around that piece.
+    pub(super) radius: f64,
+}
+
+impl Piece {
+    #[inline]
+    fn relative_to(&self, eye: DVec3) -> DAffine3 {
+        DAffine3 { translation: self.world_from_piece.translation - eye, ..self.world_from_piece }
+    }
+}
+
+impl PartState {
+    pub(super) fn pieces(&self) -> std::ops::Range<usize> {
+        self.first_piece as usize..self.end_piece as usize
+    }
+}
+
+/// Tarjan's bookkeeping.
+#[derive(Debug, Default)]
+struct Search {
+    /// When each part was visited, from 1; 0: not yet.
+    index: Vec<u32>,
+    low: Vec<u32>,
+    /// Visited and not out.
+    open: Vec<u32>,
+    frames: Vec<Visit>,
+    visited: u32,
+}
+
+/// A part whose candidates are being looked at.
+#[derive(Clone, Copy, Debug)]
+struct Visit {
+    part: u32,
+    next: u32,
+    end: u32,
+}
+
+impl VisibilitySort {
+    /// A sort without parts.
+    pub fn new(options: SortOptions) -> VisibilitySort {
+        VisibilitySort { options, ..VisibilitySort::default() }
+    }
+
+    /// Adds a hull that pieces may refer to; returns its number.
+    pub fn add_hull(&mut self, hull: Hull) -> u32 {
+        self.hulls.push(hull);
+        self.hulls.len() as u32 - 1
+    }
+
+    /// Adds a part that is the union of pieces, one a hull number (a number may come twice), shown and placed at
+    /// the origin; returns its number. Its pieces are numbered on from [`VisibilitySort::piece_count`]. A part
+    /// without pieces occludes nothing and is occluded by nothing.
+    ///
+    /// # Panics
+    /// If a hull does not exist.
+    pub fn add_part(&mut self, hulls: &[u32]) -> u32 {
+        let part = self.parts.len() as u32;
+        let first_piece = self.pieces.len() as u32;
+        for &hull in hulls {
+            assert!((hull as usize) < self.hulls.len(), "hull {hull} does not exist");
+            self.pieces.push(Piece {
+                part,
+                hull,
+                world_from_piece: DAffine3::IDENTITY,
+                radius: self.hulls[hull as usize].radius(),
+            });
+        }
+        let end_piece = self.pieces.len() as u32;
+        self.parts.push(PartState {
+            first_piece,
+            end_piece,
+            shown: true,
+            backdrop: false,
+            present: false,
+            has_known: false,
+            distance: 0.0,
+            radius: 0.0,
+        });
+        part
+    }
+
+    /// Number of parts that were ever added.
+    pub fn part_count(&self) -> usize {
+        self.parts.len()
+    }
+
+    /// Number of pieces that were ever added.
+    pub fn piece_count(&self) -> usize {
+        self.pieces.len()
+    }
+
+    /// Shows a part from the next frame on, or hides it. A part that is removed for good is hidden for good.
+    pub fn show(&mut self, part: u32, shown: bool) {
+        self.parts[part as usize].shown = shown;
+    }
+
+    /// Says that a part is behind all others wherever the eye is, as a sky is: it comes last and occludes nothing.
+    pub fn set_backdrop(&mut self, part: u32, backdrop: bool) {
+        self.parts[part as usize].backdrop = backdrop;
+    }
+
+    /// The directions of the kd-tree's extents, any number of them; it is used with
+    /// [`BroadPhase::KdTree`] alone. Directions tied to a camera are set anew before each sort.
+    pub fn set_directions(&mut self, directions: &[Direction]) {
+        self.tree.set_directions(directions);
+    }
+
+    /// How often the kd-tree was built from nothing.
+    pub fn tree_builds(&self) -> u64 {
+        self.tree.builds
+    }
+
+    /// Places a piece. A pose that is not finite takes the whole part out of the order while it lasts.
+    pub fn place(&mut self, piece: u32, world_from_piece: DAffine3) {
+        let piece = &mut self.pieces[piece as usize];
+        if piece.world_from_piece.matrix3 != world_from_piece.matrix3 {
+            piece.radius = self.hulls[piece.hull as usize].radius() * stretch(&world_from_piece);
+        }
+        piece.world_from_piece = world_from_piece;
+    }
+
+    /// Says what is known of two parts; the later word counts.
+    pub fn know(&mut self, first: u32, second: u32, known: Known) {
+        self.known.insert(pair_key(first, second), (known, true));
+        self.known.insert(pair_key(second, first), (known, false));
+        self.parts[first as usize].has_known = true;
+        self.parts[second as usize].has_known = true;
+    }
+
+    /// Sorts the parts that are shown as seen from `eye`, in every direction.
+    ///
+    /// If the eye is not finite, nothing is sorted and the order is empty. Cost: linear in parts and candidate
+    /// pairs; with nothing remembered the first order is by distance (n log n).
+    pub fn sort(&mut self, eye: DVec3) -> &Order {
+        self.counters = Counters::default();
+        self.eye = eye;
+        self.measure();
+        self.faces.build(self.options.broad_phase == BroadPhase::Grids);
+        if self.options.broad_phase == BroadPhase::KdTree {
+            self.tree.update();
+        }
+        let roots = self.roots();
+        self.pairs.turn(self.parts.len());
+        self.search.begin(self.parts.len());
+        self.order.clear();
+        for part in roots {
+            if self.search.index[part as usize] == 0 {
+                self.visit(part);
+            }
+        }
+        if self.options.conditioning {
+            self.condition();
+        }
+        self.count();
+        &self.order
+    }
+
+    /// The order that [`VisibilitySort::sort`] found last.
+    pub fn order(&self) -> &Order {
+        &self.order
+    }
+
+    /// What it did.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// Finds the extents of everything that is shown.
+    fn measure(&mut self) {
+        self.faces.clear(self.pieces.len());
+        let with_tree = self.options.broad_phase == BroadPhase::KdTree;
+        if with_tree {
+            self.tree.clear(self.pieces.len());
+        }
+        self.alive.clear();
+        self.alive.resize(self.pieces.len(), false);
+        for part in &mut self.parts {
+            let pieces = &mut self.pieces[part.first_piece as usize..part.end_piece as usize];
+            part.present = part.shown && self.eye.is_finite();
+            part.present &= pieces.iter().all(|p| p.world_from_piece.is_finite());
+            if !part.present {
+                continue;
+            }
+            part.distance = f64::INFINITY;
+            if part.backdrop {
+                continue;
+            }
+            for (piece, number) in pieces.iter().zip(part.first_piece..) {
+                let hull = &self.hulls[piece.hull as usize];
+                let pose = piece.relative_to(self.eye);
+                let center = pose.transform_point3(hull.center());
+                let distance = center.length();
+                if distance < part.distance {
+                    (part.distance, part.radius) = (distance, piece.radius);
+                }
+                self.alive[number as usize] = true;
+                self.faces.add(number, hull, &pose, (center, piece.radius), self.options.slack);
+                if with_tree {
+                    self.tree.add(number, hull, &pose);
+                }
+            }
+        }
+    }
+
+    /// The parts in last frame's order, and after them the new ones by distance.
+    fn roots(&mut self) -> Vec<u32> {
+        let present = |part: u32| self.parts[part as usize].present;
+        let mut is_old = vec![false; self.parts.len()];
+        let mut roots = Vec::with_capacity(self.parts.len());
+        if self.options.incremental {
+            for &part in self.order.parts.iter().filter(|&&part| present(part)) {
+                is_old[part as usize] = true;
+                roots.push(part);
+            }
+        }
+        let from = roots.len();
+        roots.extend((0..self.parts.len() as u32).filter(|&part| !is_old[part as usize] && present(part)));
+        let distance = |part: &u32| self.parts[*part as usize].distance;
+        roots[from..].sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        if self.parts.iter().any(|p| p.backdrop) {
+            roots.sort_by_key(|&part| self.parts[part as usize].backdrop);
+        }
+        roots
+    }
+
+    /// Visits a part and all that must come before it.
+    fn visit(&mut self, root: u32) {
+        self.open(root);
+        while let Some(visit) = self.search.frames.last().copied() {
+            let part = visit.part as usize;
+            if visit.next == visit.end {
+                self.search.frames.pop();
+                if self.search.low[part] == self.search.index[part] {
+                    self.put_out(visit.part);
+                }
+                if let Some(below) = self.search.frames.last() {
+                    let low = self.search.low[part];
+                    let below = &mut self.search.low[below.part as usize];
+                    *below = (*below).min(low);
+                }
+                continue;
+            }
+            if let Some(top) = self.search.frames.last_mut() {
+                top.next += 1;
+            }
+            let pair = self.pairs.pairs[visit.next as usize];
+            let front = self.pieces[pair.front as usize].part;
+            let index = self.search.index[front as usize];
+            // Out, or in the same component whatever the test says.
+            if !self.alive[pair.front as usize] || (index != 0 && index >= self.search.low[part]) {
+                continue;
+            }
+            if !self.occludes_as(visit.next as usize) {
+                continue;
+            }
+            self.counters.arcs_found += 1;
+            if index == 0 {
+                self.open(front);
+            } else {
+                self.search.low[part] = self.search.low[part].min(index);
+            }
+        }
+    }
+
+    /// Lists the candidates of a part that is visited for the first time.
+    fn open(&mut self, part: u32) {
+        self.search.visited += 1;
+        self.search.index[part as usize] = self.search.visited;
+        self.search.low[part as usize] = self.search.visited;
+        self.search.open.push(part);
+        let start = self.pairs.pairs.len() as u32;
+        for behind in self.parts[part as usize].pieces() {
+            let behind = behind as u32;
+            let (pairs, pieces) = (&mut self.pairs.pairs, &self.pieces);
+            let found = |front: u32| {
+                if pieces[front as usize].part != part {
+                    pairs.push(Pair { front, behind });
+                }
+            };
+            match self.options.broad_phase {
+                BroadPhase::KdTree if self.alive[behind as usize] => {
+                    self.tree.occluders(behind, &self.alive, found);
+                }
+                _ => self.faces.occluders(behind, &self.alive, found),
+            }
+        }
+        let (next, end) = self.pairs.close(part, start);
+        self.search.frames.push(Visit { part, next, end });
+    }
+
+    /// The component that `part` closes comes next in the order, nearest member first.
+    fn put_out(&mut self, part: u32) {
+        let from = self.order.parts.len();
+        loop {
+            let member = self.search.open.pop().expect("a component ends with the part that opened it");
+            for piece in self.parts[member as usize].pieces() {
+                if self.options.broad_phase == BroadPhase::KdTree && self.alive[piece] {
+                    self.tree.deactivate(piece as u32);
+                }
+                self.alive[piece] = false;
+            }
+            self.order.parts.push(member);
+            if member == part {
+                break;
+            }
+        }
+        let distance = |part: &u32| self.parts[*part as usize].distance;
+        self.order.parts[from..].sort_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)));
+        self.order.ends.push(self.order.parts.len() as u32);
+    }
+
+    /// The exact test of a listed pair.
+    fn occludes_as(&mut self, at: usize) -> bool {
+        let pair = self.pairs.pairs[at];
+        let mut witness = self.pairs.witnesses[at];
+        let result = self.occludes(pair, &mut witness);
+        self.pairs.witnesses[at] = witness;
+        result
+    }
+
+    /// Whether the front piece occludes the one behind, [Snyder & Lengyel 1997, §6].
+    #[inline]
+    pub(super) fn occludes(&mut self, pair: Pair, witness: &mut Witness) -> bool {
+        let (front, behind) = (&self.pieces[pair.front as usize], &self.pieces[pair.behind as usize]);
+        if self.parts[front.part as usize].has_known
+            && let Some(&(known, first)) = self.known.get(&pair_key(front.part, behind.part))
+        {
+            match known.says(self.eye, first) {
+                Says::No => return false,
+                Says::Yes => return true,
+                Says::AskHulls => {}
+            }
+        }
+        self.counters.exact_tests += 1;
+        let hull = |piece: &Piece| &self.hulls[piece.hull as usize];
+        let (front_pose, behind_pose) = (front.relative_to(self.eye), behind.relative_to(self.eye));
+        let shadow = Body { hull: hull(behind), outer_from_hull: &behind_pose, with_origin: true };
+        let body = Body { hull: hull(front), outer_from_hull: &front_pose, with_origin: false };
+        let mut margin = 0.0;
+        if self.options.slack > 0.0 {
+            let far = |body: &Body, radius: f64| body.center().length() + radius;
+            margin = self.options.slack * far(&shadow, behind.radius).min(far(&body, front.radius));
+        }
+        !disjoint(&shadow, &body, witness, margin)
+    }
+
+    /// Whether two pieces intersect, wherever the eye is.
+    pub(super) fn intersect(&self, a: u32, b: u32) -> bool {
+        let pose = |piece: u32| self.pieces[piece as usize].relative_to(self.eye);
+        let hull = |piece: u32| &self.hulls[self.pieces[piece as usize].hull as usize];
+        let body = |piece, pose| Body { hull: hull(piece), outer_from_hull: pose, with_origin: false };
+        !disjoint(&body(a, &pose(a)), &body(b, &pose(b)), &mut Witness::default(), 0.0)
+    }
+
+    fn count(&mut self) {
+        let (cells, entries) = self.faces.size();
+        let counters = &mut self.counters;
+        counters.parts = self.order.parts.len() as u64;
+        counters.extents = self.faces.records.len() as u64;
+        counters.cells = cells as u64;
+        counters.cell_entries = entries as u64;
+        counters.candidates = self.pairs.pairs.len() as u64;
+        let sizes = self.order.groups().map(|g| g.len() as u64).filter(|&n| n > 1);
+        for size in sizes {
+            counters.groups += 1;
+            counters.grouped_parts += size;
+            counters.largest_group = counters.largest_group.max(size);
+        }
+    }
+}
+
+impl Search {
+    fn begin(&mut self, parts: usize) {
+        self.index.clear();
+        self.index.resize(parts, 0);
+        self.low.clear();
+        self.low.resize(parts, 0);
+        self.open.clear();
+        self.frames.clear();
+        self.visited = 0;
+    }
+}
+
+fn pair_key(front: u32, behind: u32) -> u64 {
+    u64::from(front) << 32 | u64::from(behind)
+}
+
+/// Hashes a pair of parts by one multiplication: the numbers are our own, nobody chooses them to collide.
+#[derive(Default)]
+struct PairHasher(u64);
+
+impl Hasher for PairHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&b| self.write_u64(u64::from(b)));
+    }
+
+    fn write_u64(&mut self, key: u64) {
+        let product = u128::from(self.0 ^ key) * 0x9e37_79b9_7f4a_7c15_u128;
+        self.0 = (product >> 64) as u64 ^ product as u64;
+    }
+}
+
+/// An upper bound of how much a map stretches: its longest axis where the axes stand at right angles.
+fn stretch(map: &DAffine3) -> f64 {
+    let m = map.matrix3;
+    let lengths = [m.x_axis, m.y_axis, m.z_axis].map(|a| a.length_squared());
+    let longest = lengths.iter().copied().fold(0.0, f64::max);
+    let skew =
+        m.x_axis.dot(m.y_axis).abs().max(m.y_axis.dot(m.z_axis).abs()).max(m.z_axis.dot(m.x_axis).abs());
+    if skew <= 1e-9 * longest { longest.sqrt() * (1.0 + 1e-8) } else { lengths.iter().sum::<f64>().sqrt() }
+}
