@@ -18,6 +18,9 @@ pub struct PartOptions {
     /// Up to so many convex hulls around each mesh that is not convex; with one, holes are filled
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     hulls: u32,
+    /// Make hulls smaller by so many per cent: parts that only touch then have an order
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.0, value_parser = percent)]
+    shrink: f64,
     /// Parts that are behind all others, as a sky is
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     backdrop: Vec<String>,
@@ -33,6 +36,11 @@ fn granularity(text: &str) -> Result<Granularity, String> {
         return Err("write names with commas between them, or depth=N".into());
     }
     Ok(Granularity::Names(names))
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|p| (0.0..=50.0).contains(p));
+    value.ok_or_else(|| "write a number from 0 to 50".into())
 }
 
 /// How much farther than the scene is large the eye of an orthographic view stands.
@@ -57,8 +65,8 @@ impl Sorting {
         verbosity: Verbosity,
     ) -> Result<Sorting, Failure> {
         let spinner = verbosity.spinner("making hulls".into());
-        let parts =
-            Parts::with_hulls(scene, &options.parts.clone().unwrap_or_default(), options.hulls.max(1));
+        let granularity = options.parts.clone().unwrap_or_default();
+        let parts = Parts::with_hulls(scene, &granularity, options.hulls.max(1), options.shrink / 100.0);
         spinner.finish_and_clear();
         let parts = parts.map_err(|e| Failure::work(format!("{source}: {e}")))?;
         if !parts.empty_instances.is_empty() {

@@ -4,7 +4,7 @@ use super::sort::VisibilitySort;
 use super::split::{SplitBy, split};
 use crate::geometry::Hull;
 use crate::scene::{Instance, Mesh, Scene};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -63,13 +63,21 @@ impl Parts {
     /// The parts of `scene`, and a hull for each mesh they show. Cost: the vertices of these meshes, and the
     /// instances.
     pub fn of(scene: &Scene, granularity: &Granularity) -> Result<Parts, PartsError> {
-        Parts::with_hulls(scene, granularity, 1)
+        Parts::with_hulls(scene, granularity, 1, 0.0)
     }
 
     /// As [`Parts::of`], with up to `hulls` hulls a mesh: a mesh that is not convex is divided where it is least so
     /// ([`SplitBy::Adaptive`]) and the hulls are put around the pieces, until no surface is deeper inside its hull
     /// than a hundredth of the mesh's size. What is drawn is not divided.
-    pub fn with_hulls(scene: &Scene, granularity: &Granularity, hulls: u32) -> Result<Parts, PartsError> {
+    ///
+    /// `shrink` makes each hull smaller about its centre by this share: parts that only touch, or sink into each other
+    /// a little, then have an order, at the price of what shows of that. 0 is safe.
+    pub fn with_hulls(
+        scene: &Scene,
+        granularity: &Granularity,
+        hulls: u32,
+        shrink: f64,
+    ) -> Result<Parts, PartsError> {
         let count = scene.instance_count();
         if count > MOST_INSTANCES {
             return Err(PartsError::TooMany(count));
@@ -89,7 +97,7 @@ impl Parts {
                 let bits = corners.map(|p| p.to_array().map(f32::to_bits)).collect();
                 let add = || {
                     let first = found.hulls.len() as u32;
-                    found.hulls.extend(hulls_around(mesh, hulls));
+                    found.hulls.extend(hulls_around(mesh, hulls).iter().map(|hull| shrunk(hull, shrink)));
                     first..found.hulls.len() as u32
                 };
                 hulls_of_points.entry(bits).or_insert_with(add).clone()
@@ -174,6 +182,13 @@ fn hulls_around(mesh: &Mesh, most: u32) -> Vec<Hull> {
         }
     }
     Hull::around(&used_points(mesh)).into_iter().collect()
+}
+
+/// A hull made smaller about its centre by a share.
+fn shrunk(hull: &Hull, by: f64) -> Hull {
+    let smaller = DAffine3::from_scale(DVec3::splat(1.0 - by));
+    let to_center = DAffine3::from_translation(hull.center());
+    if by == 0.0 { hull.clone() } else { hull.transformed(&(to_center * smaller * to_center.inverse())) }
 }
 
 /// The positions that a mesh's triangles use.
