@@ -3,6 +3,7 @@
 mod box_tests;
 mod coherence;
 mod drawing_inputs;
+mod cull;
 mod exact;
 mod greene;
 mod growth;
@@ -66,6 +67,7 @@ pub static TABLES: &[TableInfo] = &[
     order::STATISTICS,
     order::CANYON,
     order::RIVALS,
+    cull::INFO,
 ];
 
 const fn column(key: &'static str, title: &'static str, digits: usize) -> Column {
