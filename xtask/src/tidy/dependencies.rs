@@ -7,7 +7,8 @@ use std::path::Path;
 use std::process::Command;
 
 const ENGINE: &str = "hither";
-const ALLOWED: &[&str] = &["fearless_simd", "glam", "i_overlay", "parry3d-f64", "rayon", "robust", "thiserror"];
+const ALLOWED: &[&str] =
+    &["fearless_simd", "glam", "i_overlay", "parry3d-f64", "rayon", "robust", "thiserror"];
 
 /// Checks the engine's dependencies, build dependencies included; tests may use what they like.
 pub fn check(root: &Path) -> Result<Vec<Finding>> {

@@ -2,8 +2,8 @@
 
 mod box_tests;
 mod coherence;
-mod drawing_inputs;
 mod cull;
+mod drawing_inputs;
 mod exact;
 mod greene;
 mod growth;
