@@ -10,6 +10,7 @@
 
 pub mod classic;
 pub mod conventions;
+pub mod cull;
 pub mod geometry;
 pub mod hidden_line;
 pub mod index;

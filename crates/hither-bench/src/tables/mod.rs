@@ -2,6 +2,7 @@
 
 mod box_tests;
 mod coherence;
+mod cull;
 mod drawing_inputs;
 mod exact;
 mod greene;
@@ -66,6 +67,7 @@ pub static TABLES: &[TableInfo] = &[
     order::STATISTICS,
     order::CANYON,
     order::RIVALS,
+    cull::INFO,
 ];
 
 const fn column(key: &'static str, title: &'static str, digits: usize) -> Column {

@@ -1,6 +1,7 @@
 //! The commands: each reads its options, lets the engine work, and says what came out.
 
 mod bench;
+mod cull;
 mod demo;
 mod info;
 mod layers;
@@ -29,6 +30,8 @@ pub enum Command {
     Order(Box<order::Arguments>),
     /// As separate images?
     Layers(Box<layers::Arguments>),
+    /// What could be seen?
+    Cull(Box<cull::Arguments>),
     /// How fast, against what?
     Bench(bench::Arguments),
 }
@@ -42,6 +45,7 @@ pub fn run(command: Option<Command>) -> Result<(), Failure> {
         Some(Command::Lines(arguments)) => lines::run(&arguments),
         Some(Command::Order(arguments)) => order::run(&arguments),
         Some(Command::Layers(arguments)) => layers::run(&arguments),
+        Some(Command::Cull(arguments)) => cull::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         None => demo::run(),
     }

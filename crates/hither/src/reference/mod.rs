@@ -14,6 +14,7 @@ pub mod ivs;
 pub mod lines;
 pub mod occlusion;
 mod probe;
+pub mod sight;
 pub mod trouble;
 pub mod zbuffer;
 

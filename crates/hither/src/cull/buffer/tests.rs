@@ -1,0 +1,477 @@
+//! The zero: nothing that is called hidden can be seen, on scenes made to be nasty.
+
+use super::*;
+use crate::geometry::Aabb;
+use crate::reference::sight::Sight;
+use crate::reference::trouble::{self, Random};
+use crate::scene::{Content, Material, Mesh, Node, Primitive, Scene, Transform};
+use glam::{DVec3, Vec3};
+
+/// A buffer with everything of `scene` drawn into it.
+fn drawn(scene: &Scene, view: &View, options: &OcclusionOptions) -> OcclusionBuffer {
+    let occluders: Vec<Occluder> =
+        scene.meshes.iter().map(|m| Occluder::of_mesh(m, &scene.materials)).collect();
+    let mut buffer = OcclusionBuffer::new(view, options).unwrap();
+    for instance in scene.instances() {
+        buffer.draw(&occluders[instance.mesh as usize], &instance.world_from_mesh);
+    }
+    buffer
+}
+
+/// A point of the closed square of pixel (x, y), often on its border.
+fn point_of_pixel(random: &mut Random, x: u32, y: u32) -> (f64, f64) {
+    let mut coordinate = |p: u32| {
+        let inside = match random.below(6) {
+            0 => 1e-9,
+            1 => 1.0 - 1e-9,
+            _ => random.unit(),
+        };
+        f64::from(p) + inside
+    };
+    (coordinate(x), coordinate(y))
+}
+
+/// Asserts that rays through covered pixels meet something no farther than what the pixels hold; returns the
+/// numbers of pixels covered and of rays.
+fn attack(scene: &Scene, view: &View, random: &mut Random, rays: u32, what: &str) -> (u64, u64) {
+    let buffer = drawn(scene, view, &OcclusionOptions::default());
+    let sight = Sight::new(scene, view);
+    let (mut covered, mut shot) = (0, 0);
+    for y in 0..view.height {
+        for x in 0..view.width {
+            let held = f64::from(buffer.depth(x, y));
+            if held == 0.0 {
+                continue;
+            }
+            covered += 1;
+            for _ in 0..rays {
+                let (px, py) = point_of_pixel(random, x, y);
+                let truth = sight.depth(px, py);
+                shot += 1;
+                assert!(
+                    truth >= held * (1.0 - 1e-12),
+                    "{what}: pixel ({x}, {y}) holds {held}, but at ({px}, {py}) the truth is {truth}"
+                );
+            }
+        }
+    }
+    (covered, shot)
+}
+
+#[test]
+fn no_pixel_holds_more_than_is_there_in_trouble() {
+    let random = &mut Random::new(1);
+    let (mut covered, mut shot) = (0, 0);
+    for seed in 0..3000 {
+        let (scene, view) = (trouble::scene(seed), trouble::view(seed));
+        let (c, s) = attack(&scene, &view, random, 6, &format!("seed {seed}"));
+        covered += c;
+        shot += s;
+    }
+    assert!(covered > 100_000 && shot > 600_000, "{covered} pixels, {shot} rays");
+}
+
+/// Closed, bumpy, connected meshes of many small faces: folds, silhouettes in front of the same surface.
+fn lump(random: &mut Random, rings: u32, spokes: u32, bump: f64) -> Mesh {
+    let mut mesh = Mesh::default();
+    mesh.positions.push(Vec3::Y);
+    for i in 1..rings {
+        for k in 0..spokes {
+            let (theta, phi) = (
+                std::f64::consts::PI * f64::from(i) / f64::from(rings),
+                std::f64::consts::TAU * f64::from(k) / f64::from(spokes),
+            );
+            let r = random.between(1.0 - bump, 1.0 + bump);
+            let p = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()) * r;
+            mesh.positions.push(p.as_vec3());
+        }
+    }
+    mesh.positions.push(Vec3::NEG_Y);
+    let last = mesh.positions.len() as u32 - 1;
+    let at = |i: u32, k: u32| 1 + (i - 1) * spokes + k % spokes;
+    for k in 0..spokes {
+        mesh.triangles.push([0, at(1, k + 1), at(1, k)]);
+        for i in 1..rings - 1 {
+            mesh.triangles.push([at(i, k), at(i, k + 1), at(i + 1, k + 1)]);
+            mesh.triangles.push([at(i, k), at(i + 1, k + 1), at(i + 1, k)]);
+        }
+        mesh.triangles.push([last, at(rings - 1, k), at(rings - 1, k + 1)]);
+    }
+    mesh.primitives = vec![Primitive { triangles: 0..mesh.triangles.len() as u32, material: Some(0) }];
+    mesh
+}
+
+fn lumps(seed: u64) -> Scene {
+    let random = &mut Random::new(seed);
+    let mut scene = Scene::new("lumps");
+    scene.materials = vec![Material { double_sided: random.one_in(4), ..Material::default() }];
+    for _ in 0..1 + random.below(3) {
+        let bump = [0.0, 0.05, 0.5, 0.9][random.below(4) as usize];
+        let (rings, spokes) = (3 + random.below(10), 3 + random.below(12));
+        let mesh = lump(random, rings, spokes, bump);
+        scene.meshes.push(mesh);
+        let content = Content::Mesh(scene.meshes.len() as u32 - 1);
+        let at = DVec3::new(random.between(-2.0, 2.0), random.between(-2.0, 2.0), random.between(-2.0, 2.0));
+        scene.groups[0].push(Node { content, local: Transform::from_translation(at), ..Node::default() });
+    }
+    scene
+}
+
+fn around(random: &mut Random, reach: f64, size: (u32, u32)) -> View {
+    let mut point =
+        || DVec3::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0), random.between(-1.0, 1.0));
+    let (eye, target) = (point() * reach, point());
+    let projection = Projection::Perspective { fov_y: random.between(0.2, 2.0), near: 0.05 };
+    View::look_at(eye, target, DVec3::Y, projection, size)
+}
+
+#[test]
+fn no_pixel_holds_more_than_is_there_on_folded_closed_surfaces() {
+    let random = &mut Random::new(2);
+    let (mut covered, mut shot) = (0, 0);
+    for seed in 0..1500 {
+        let scene = lumps(seed);
+        let size = (1 + random.below(70), 1 + random.below(70));
+        let reach = [3.0, 6.0, 20.0, 1.0][random.below(4) as usize];
+        let view = around(random, reach, size);
+        let (c, s) = attack(&scene, &view, random, 4, &format!("seed {seed}"));
+        covered += c;
+        shot += s;
+    }
+    assert!(covered > 200_000 && shot > 800_000, "{covered} pixels, {shot} rays");
+}
+
+#[test]
+fn edges_inside_a_surface_do_not_leak() {
+    let random = &mut Random::new(3);
+    for _ in 0..20 {
+        // A ball that fills the middle of the image, of faces from far larger to far smaller than a pixel.
+        let mut scene = Scene::new("ball");
+        scene.materials = vec![Material::default()];
+        let fine = 3 + random.below(60);
+        scene.meshes = vec![lump(random, fine, fine, 0.0)];
+        scene.groups[0].push(Node { content: Content::Mesh(0), ..Node::default() });
+        let eye = DVec3::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0), 3.0);
+        let lens = Projection::Perspective { fov_y: 0.9, near: 0.1 };
+        let view = View::look_at(eye, DVec3::ZERO, DVec3::Y, lens, (96, 96));
+        let buffer = drawn(&scene, &view, &OcclusionOptions::default());
+        let sight = Sight::new(&scene, &view);
+        // Wherever a pixel and its neighbours are covered at all their corners, the pixel is.
+        let inside: Vec<bool> =
+            (0..97 * 97).map(|i| sight.depth(f64::from(i % 97), f64::from(i / 97)) > 0.0).collect();
+        for y in 1..95usize {
+            for x in 1..95usize {
+                let all = (y - 1..=y + 2).all(|j| (x - 1..=x + 2).all(|i| inside[j * 97 + i]));
+                if all {
+                    assert!(buffer.depth(x as u32, y as u32) > 0.0, "leak at ({x}, {y}), {fine} rings");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn order_instruction_set_bands_and_threads_change_nothing() {
+    for seed in 0..40 {
+        let (scene, view) = (trouble::scene(seed + 1000), trouble::view(seed + 1000));
+        let reference = drawn(&scene, &view, &OcclusionOptions::default()).depths();
+        let plain = OcclusionOptions { level: Level::baseline(), ..OcclusionOptions::default() };
+        assert!(drawn(&scene, &view, &plain).depths() == reference, "seed {seed}: instruction sets differ");
+        let occluders: Vec<Occluder> =
+            scene.meshes.iter().map(|m| Occluder::of_mesh(m, &scene.materials)).collect();
+        let mut instances = scene.instances();
+        instances.reverse();
+        let shared = SharedBuffer::new(&view, &OcclusionOptions::default(), 3).unwrap();
+        std::thread::scope(|scope| {
+            for half in instances.chunks(instances.len().div_ceil(2).max(1)) {
+                let (shared, occluders) = (&shared, &occluders);
+                scope.spawn(move || {
+                    for i in half {
+                        shared.draw(&occluders[i.mesh as usize], &i.world_from_mesh);
+                    }
+                });
+            }
+        });
+        let pixels = (0..view.height).flat_map(|y| (0..view.width).map(move |x| (x, y)));
+        let depths: Vec<f32> = pixels.map(|(x, y)| shared.depth(x, y)).collect();
+        assert!(depths == reference, "seed {seed}: threads or order differ");
+    }
+}
+
+/// A box somewhere in or around a scene; rarely one that is no box.
+fn some_box(random: &mut Random) -> Aabb {
+    let center = DVec3::new(random.between(-8.0, 8.0), random.between(-8.0, 8.0), random.between(-8.0, 8.0));
+    let size = [0.0, 1e-3, 0.1, 1.0, 5.0][random.below(5) as usize];
+    let half = DVec3::new(random.unit(), random.unit(), random.unit()) * size;
+    Aabb { min: center - half, max: center + half }
+}
+
+#[test]
+fn no_box_that_is_hidden_can_be_seen() {
+    let random = &mut Random::new(4);
+    let mut counts = [0u64; 3];
+    for seed in 0..2500 {
+        let (scene, view) = (trouble::scene(seed + 5000), trouble::view(seed + 5000));
+        let buffer = drawn(&scene, &view, &OcclusionOptions::default());
+        let sight = Sight::new(&scene, &view);
+        let bounds: Vec<Aabb> = (0..400).map(|_| some_box(random)).collect();
+        let boxes: Boxes = bounds.iter().copied().collect();
+        let mut verdicts = Vec::new();
+        buffer.ask(&boxes, &mut verdicts);
+        for (b, verdict) in bounds.iter().zip(&verdicts) {
+            counts[*verdict as usize] += 1;
+            if *verdict != Verdict::Visible {
+                points_are_out_of_sight(&sight, &view, b, *verdict, random, seed);
+            }
+        }
+    }
+    // A million boxes asked about.
+    assert!(counts.iter().all(|&c| c > 10_000), "{counts:?}");
+}
+
+/// Shoots at points of a box: its corners, and others.
+fn points_are_out_of_sight(
+    sight: &Sight,
+    view: &View,
+    b: &Aabb,
+    verdict: Verdict,
+    random: &mut Random,
+    seed: u64,
+) {
+    for k in 0..16u32 {
+        let pick = DVec3::from_array([0, 1, 2].map(|axis: u32| match k {
+            0..8 => f64::from(k >> axis & 1),
+            _ => random.unit(),
+        }));
+        let p = view.view_from_world.transform_point3(b.min + (b.max - b.min) * pick);
+        let distance = -p.z;
+        let (origin, direction) = match view.projection {
+            Projection::Perspective { .. } => (DVec3::ZERO, p / distance),
+            Projection::Orthographic { .. } => (DVec3::new(p.x, p.y, 0.0), DVec3::NEG_Z),
+        };
+        if distance < view.projection.near() || view.projection.distance(f32::MIN_POSITIVE) < distance {
+            continue;
+        }
+        let scale = view.pixels_per_unit();
+        let (sx, sy) = match view.projection {
+            Projection::Perspective { .. } => (direction.x * scale, -direction.y * scale),
+            Projection::Orthographic { .. } => (p.x * scale, -p.y * scale),
+        };
+        let (hw, hh) = (f64::from(view.width) * 0.5, f64::from(view.height) * 0.5);
+        if sx.abs() > hw - 1e-9 || sy.abs() > hh - 1e-9 {
+            continue;
+        }
+        assert!(verdict == Verdict::Hidden, "seed {seed}: {b:?} is in view at {p}");
+        let nearest = sight.distance((origin, direction));
+        assert!(
+            nearest <= distance * (1.0 + 1e-12),
+            "seed {seed}: {b:?} is seen at {p}; nearest is {nearest}"
+        );
+    }
+}
+
+/// One box seen from the front: it fills the image's middle.
+fn wall() -> (Occluder, View) {
+    let corner =
+        |k: u32| Vec3::new((k & 1) as f32 - 0.5, (k >> 1 & 1) as f32 - 0.5, (k >> 2 & 1) as f32 - 0.5);
+    let quads = [[0u32, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles: Vec<[u32; 3]> =
+        quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
+    let positions: Vec<Vec3> = (0..8).map(corner).collect();
+    let lens = Projection::Perspective { fov_y: 1.0, near: 0.1 };
+    let view = View::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, lens, (160, 120));
+    (Occluder::new(&positions, &triangles, Sides::Front).unwrap(), view)
+}
+
+fn cube_at(center: DVec3, half: f64) -> Aabb {
+    Aabb { min: center - half, max: center + half }
+}
+
+#[test]
+fn boxes_that_are_none_are_never_hidden() {
+    let (wall, view) = wall();
+    let mut buffer = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
+    buffer.draw(&wall, &DAffine3::from_scale(DVec3::new(50.0, 50.0, 1.0)));
+    let mut sampled = SampledBuffer::new(&view).unwrap();
+    sampled.draw(&wall, &DAffine3::from_scale(DVec3::new(50.0, 50.0, 1.0)));
+    let behind = cube_at(DVec3::NEG_Z * 10.0, 1.0);
+    assert_eq!(buffer.ask_box(&behind), Verdict::Hidden);
+    assert_eq!(sampled.ask_box(&behind), Verdict::Hidden);
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
+        for axis in 0..3 {
+            for end in 0..2 {
+                let mut b = behind;
+                let side = if end == 0 { &mut b.min } else { &mut b.max };
+                side[axis] = bad;
+                assert_eq!(buffer.ask_box(&b), Verdict::Visible, "{b:?}");
+                assert_eq!(sampled.ask_box(&b), Verdict::Visible, "{b:?}");
+            }
+        }
+        if !bad.is_finite() {
+            assert_eq!(buffer.ask_sphere(DVec3::new(0.0, 0.0, bad), 1.0), Verdict::Visible);
+        }
+        assert_eq!(buffer.ask_sphere(DVec3::NEG_Z * 9.0, bad.abs()), Verdict::Visible);
+        let rect = ScreenRect { left: 1.0, top: 1.0, right: 2.0, bottom: 2.0, depth: bad as f32 };
+        assert!(bad == f64::NEG_INFINITY || buffer.ask_rect(&rect) == Verdict::Visible);
+    }
+    assert_eq!(buffer.ask_box(&Aabb::EMPTY), Verdict::Visible);
+    // Around the eye, behind it, beside the view.
+    assert_eq!(buffer.ask_box(&cube_at(DVec3::Z * 5.0, 1.0)), Verdict::Visible);
+    assert_eq!(buffer.ask_box(&cube_at(DVec3::Z * 9.0, 1.0)), Verdict::Outside);
+    assert_eq!(buffer.ask_box(&cube_at(DVec3::X * 90.0, 1.0)), Verdict::Outside);
+    let mut verdicts = vec![Verdict::Visible];
+    buffer.ask(&Boxes::default(), &mut verdicts);
+    assert!(verdicts.is_empty());
+}
+
+#[test]
+fn balls_rectangles_and_meshes_agree_with_boxes() {
+    let (wall, view) = wall();
+    let mut buffer = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
+    buffer.draw(&wall, &DAffine3::from_scale(DVec3::new(2.0, 2.0, 0.1)));
+    let random = &mut Random::new(9);
+    let mut counts = [0; 3];
+    for _ in 0..3000 {
+        let center =
+            DVec3::new(random.between(-4.0, 4.0), random.between(-4.0, 4.0), random.between(-9.0, 6.0));
+        let half = random.between(0.01, 1.0);
+        let around = buffer.ask_box(&cube_at(center, half));
+        counts[around as usize] += 1;
+        // A ball that reaches the near plane is not looked at more closely.
+        if around != Verdict::Visible && center.z + half < 4.8 {
+            assert_ne!(buffer.ask_sphere(center, half * 0.999), Verdict::Visible, "{center} {half}");
+            let at = DAffine3::from_scale_rotation_translation(
+                DVec3::splat(half * 1.998),
+                glam::DQuat::IDENTITY,
+                center,
+            );
+            assert_ne!(buffer.ask_mesh(&wall, &at), Verdict::Visible, "{center} {half}");
+        }
+        if buffer.ask_sphere(center, half * 1.75) == Verdict::Hidden {
+            assert_eq!(around, Verdict::Hidden, "{center} {half}");
+        }
+    }
+    assert!(counts.iter().all(|&c| c > 100), "{counts:?}");
+    let middle = |depth| ScreenRect { left: 70.0, top: 50.0, right: 90.0, bottom: 70.0, depth };
+    assert_eq!(buffer.ask_rect(&middle(0.01)), Verdict::Hidden);
+    assert_eq!(buffer.ask_rect(&middle(0.5)), Verdict::Visible);
+    assert_eq!(buffer.ask_rect(&ScreenRect { left: 161.0, right: 170.0, ..middle(0.5) }), Verdict::Outside);
+}
+
+#[test]
+fn merging_is_drawing_both_and_more_occluders_never_reveal() {
+    for seed in 0..60 {
+        let (scene, view) = (trouble::scene(seed + 300), trouble::view(seed + 300));
+        let occluders: Vec<Occluder> =
+            scene.meshes.iter().map(|m| Occluder::of_mesh(m, &scene.materials)).collect();
+        let empty = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
+        let (mut both, mut halves) = (empty.clone(), [empty.clone(), empty]);
+        for (i, instance) in scene.instances().iter().enumerate() {
+            let before = both.depths();
+            both.draw(&occluders[instance.mesh as usize], &instance.world_from_mesh);
+            assert!(both.depths().iter().zip(&before).all(|(now, then)| now >= then), "seed {seed}");
+            halves[i % 2].draw(&occluders[instance.mesh as usize], &instance.world_from_mesh);
+        }
+        let [mut one, other] = halves;
+        one.merge(&other).unwrap();
+        assert!(one.depths() == both.depths(), "seed {seed}");
+    }
+    let (_, view) = wall();
+    let mut small = OcclusionBuffer::new(&View { width: 10, ..view }, &OcclusionOptions::default()).unwrap();
+    assert!(small.merge(&OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap()).is_err());
+}
+
+#[test]
+fn sizes_from_one_pixel_to_the_largest() {
+    let (wall, view) = wall();
+    for (width, height) in [(1, 1), (1, 16384), (16384, 1), (16384, 16), (17, 33)] {
+        let view = View { width, height, ..view };
+        let mut buffer = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
+        buffer.draw(&wall, &DAffine3::from_scale(DVec3::new(1e5, 1e5, 1.0)));
+        assert!(buffer.depths().iter().all(|&d| d > 0.0), "{width}x{height}");
+        assert_eq!(buffer.ask_box(&cube_at(DVec3::NEG_Z * 10.0, 1.0)), Verdict::Hidden);
+        buffer.clear();
+        assert!(buffer.depths().iter().all(|&d| d == 0.0));
+    }
+    for (width, height) in [(0, 1), (1, 0), (16385, 1)] {
+        let wrong = View { width, height, ..view };
+        assert!(OcclusionBuffer::new(&wrong, &OcclusionOptions::default()).is_err());
+        assert!(SharedBuffer::new(&wrong, &OcclusionOptions::default(), 2).is_err());
+        assert!(SampledBuffer::new(&wrong).is_err());
+    }
+    let wrong = OcclusionOptions { eye_moves: f64::NAN, ..OcclusionOptions::default() };
+    assert!(OcclusionBuffer::new(&view, &wrong).is_err());
+}
+
+#[test]
+fn eyes_in_on_and_at_a_corner_of_an_occluder_are_told_the_truth() {
+    let (wall, view) = wall();
+    let random = &mut Random::new(21);
+    let mut scene = Scene::new("wall");
+    scene.materials = vec![Material::default()];
+    let mut mesh = Mesh::default();
+    for (corners, _) in wall.triangles() {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(corners.map(Vec3::from));
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+    mesh.primitives = vec![Primitive { triangles: 0..12, material: Some(0) }];
+    scene.meshes = vec![mesh];
+    scene.groups[0].push(Node { content: Content::Mesh(0), ..Node::default() });
+    for eye in
+        [DVec3::ZERO, DVec3::splat(0.5), DVec3::new(0.5, 0.1, 0.2), DVec3::new(0.5, 3.0, 0.5), DVec3::X]
+    {
+        for target in [DVec3::NEG_Z, DVec3::new(0.3, 0.2, -0.9), DVec3::Y * 0.4] {
+            let lens = Projection::Perspective { fov_y: 1.5, near: 0.01 };
+            let view = View::look_at(eye, eye + target, DVec3::X, lens, (view.width / 4, view.height / 4));
+            attack(&scene, &view, random, 4, &format!("{eye} {target}"));
+        }
+    }
+}
+
+#[test]
+fn within_the_margin_a_moved_eye_sees_no_hidden_box_however_objects_move() {
+    let (wall, view) = wall();
+    let random = &mut Random::new(31);
+    let mut hidden = 0;
+    for round in 0..60 {
+        let (r, m) = (random.between(0.0, 0.2), random.between(0.0, 0.1));
+        let options = OcclusionOptions { eye_moves: r, objects_move: m, ..OcclusionOptions::default() };
+        let mut buffer = OcclusionBuffer::new(&view, &options).unwrap();
+        let mut walls = Vec::new();
+        for _ in 0..6 {
+            let at =
+                DVec3::new(random.between(-2.0, 2.0), random.between(-1.5, 1.5), random.between(-3.0, 2.0));
+            let size =
+                DVec3::new(random.between(0.5, 3.0), random.between(0.5, 3.0), random.between(0.01, 1.0));
+            buffer.draw(&wall, &DAffine3::from_scale_rotation_translation(size, glam::DQuat::IDENTITY, at));
+            walls.push((at, size));
+        }
+        for _ in 0..400 {
+            let at =
+                DVec3::new(random.between(-4.0, 4.0), random.between(-3.0, 3.0), random.between(-8.0, 2.0));
+            if buffer.ask_box(&cube_at(at, random.between(0.0, 0.3))) != Verdict::Hidden {
+                continue;
+            }
+            hidden += 1;
+            for _ in 0..20 {
+                let mut step = |by: f64| {
+                    let mut c = || random.between(-1.0, 1.0);
+                    DVec3::new(c(), c(), c()).normalize_or_zero() * by
+                };
+                let (eye, point) = (DVec3::Z * 5.0 + step(r), at + step(m));
+                let blocked = walls.iter().any(|&(at, size)| crosses(eye, point, at + step(m), size * 0.5));
+                assert!(blocked, "round {round}: from {eye} the point {point} is seen; r = {r}, m = {m}");
+            }
+        }
+    }
+    assert!(hidden > 1000, "{hidden}");
+}
+
+/// Whether the segment from `eye` to `point` meets a box.
+fn crosses(eye: DVec3, point: DVec3, center: DVec3, half: DVec3) -> bool {
+    let way = point - eye;
+    let (a, b) = ((center - half - eye) / way, (center + half - eye) / way);
+    let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
+    enter <= leave && leave >= 0.0 && enter <= 1.0
+}
