@@ -9,6 +9,7 @@
 #![forbid(unsafe_code)]
 
 pub mod conventions;
+pub mod cull;
 pub mod geometry;
 pub mod index;
 pub mod raster;

@@ -4,6 +4,7 @@
 //! Every tree, whichever way it was built, is the same flat array of 16-wide nodes, so that one
 //! nearest-first walk serves them all.
 
+mod boxes;
 mod bvh;
 mod group;
 mod mesh;
@@ -13,6 +14,7 @@ mod poses;
 mod refit;
 mod tree;
 
+pub(crate) use boxes::tree_of_boxes;
 pub(crate) use group::GroupIndex;
 pub(crate) use mesh::{BlockTree, MeshIndex};
 pub(crate) use tree::{Box3, Child, Slot, WideTree};

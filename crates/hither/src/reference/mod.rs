@@ -8,6 +8,7 @@
 
 mod caster;
 mod probe;
+pub mod sight;
 pub mod trouble;
 pub mod zbuffer;
 

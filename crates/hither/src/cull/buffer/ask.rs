@@ -1,0 +1,240 @@
+//! Sixteen boxes at a time onto the screen: which pixels each may touch, and how near it may come.
+//!
+//! *Bound.* A row's dot product in f32 with rounded coefficients differs from the exact one by at most
+//! `8·2⁻²⁴·(|r₀|·X + |r₁|·Y + |r₂|·Z + |r₃|)`, where X, Y, Z are the box's largest coordinates: four rounded
+//! coefficients, three products and three sums. It is taken for each box by itself. With errors eₓ of a
+//! numerator, e_w of W and a quotient q, a screen coordinate is off by at most
+//! `(eₓ + |q|·e_w) / (W − e_w)` plus four roundings of q. Each comparison of a number that is not one fails
+//! on the side of *visible*.
+
+use crate::raster::ScreenFromObject;
+use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
+
+/// A transform made ready for boxes of its space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BoxView {
+    /// Pixels.
+    x: [f32; 4],
+    y: [f32; 4],
+    w: [f32; 4],
+    d: [f32; 4],
+    perspective: bool,
+    width: f32,
+    height: f32,
+    /// Whether f32 can hold the numbers; else every box is seen everywhere.
+    in_range: bool,
+    /// Pixels beyond the image's border that an eye within the margin may see.
+    pub ring: f32,
+}
+
+/// Where sixteen boxes lie.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BoxesOnScreen {
+    /// First column each may touch, clipped to the image; then first row, last column, last row.
+    pub left: [i32; 16],
+    pub top: [i32; 16],
+    pub right: [i32; 16],
+    pub bottom: [i32; 16],
+    /// No point of the box has a larger depth; +∞ where it may reach the near plane.
+    pub depth: [f32; 16],
+    /// Boxes that the image may show.
+    pub inside: u16,
+    /// Of these, boxes wholly beyond the near plane and within the guard band.
+    pub clear: u16,
+    /// Of these, boxes that no border of the image cuts.
+    pub uncut: u16,
+}
+
+impl BoxView {
+    pub fn new(at: &ScreenFromObject, width: u32, height: u32) -> BoxView {
+        let pixels = |r: [f64; 4]| r.map(|c| (c / 256.0) as f32);
+        let plain = |r: [f64; 4]| r.map(|c| c as f32);
+        let in_range = [at.x, at.y, at.w, at.d].as_flattened().iter().all(|c| c.abs() < 1e18);
+        BoxView {
+            in_range,
+            x: pixels(at.x),
+            y: pixels(at.y),
+            w: plain(at.w),
+            d: plain(at.d),
+            perspective: at.perspective,
+            width: width as f32,
+            height: height as f32,
+            ring: 0.0,
+        }
+    }
+}
+
+/// Eight times half a unit in the last place, and a little for the rounding of the bound itself.
+const ROUNDING: f32 = 8.1 / (1 << 24) as f32;
+
+// long because its steps share sixteen boxes' worth of registers
+/// Projects boxes given as `min` and `max` (axis, lane).
+#[inline(always)]
+pub(crate) fn project<S: Simd>(
+    simd: S,
+    view: &BoxView,
+    min: &[[f32; 16]; 3],
+    max: &[[f32; 16]; 3],
+) -> BoxesOnScreen {
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let (lo, hi) = (
+        min.each_ref().map(|a| f32x16::from_slice(simd, a)),
+        max.each_ref().map(|a| f32x16::from_slice(simd, a)),
+    );
+    let reach: [f32x16<S>; 3] =
+        [lo[0].abs().max(hi[0].abs()), lo[1].abs().max(hi[1].abs()), lo[2].abs().max(hi[2].abs())];
+    let error = |r: &[f32; 4]| {
+        let size = reach[0] * r[0].abs() + reach[1] * r[1].abs() + reach[2] * r[2].abs() + r[3].abs();
+        size * ROUNDING
+    };
+    let (x_error, y_error) = (error(&view.x), error(&view.y));
+    let (x, y) = (corners(simd, &view.x, &lo, &hi), corners(simd, &view.y, &lo, &hi));
+    let (mut low, mut high) = ([splat(0.0); 2], [splat(0.0); 2]);
+    let (least_w, w_error, depth, clear, mut inside);
+    if view.perspective {
+        let w = corners(simd, &view.w, &lo, &hi);
+        w_error = error(&view.w);
+        least_w = smallest(&w) - w_error;
+        let near = splat(view.d[3] * 1.000_001);
+        clear = least_w.simd_gt(near) & least_w.simd_gt(w_error * 8.0);
+        inside = (largest(&w) + w_error).simd_ge(splat(view.d[3] * 0.999_999));
+        depth = near / least_w * 1.000_001;
+        for c in 0..8 {
+            let reciprocal = splat(1.0) / w[c];
+            let (qx, qy) = (x[c] * reciprocal, y[c] * reciprocal);
+            if c == 0 {
+                (low, high) = ([qx, qy], [qx, qy]);
+            } else {
+                low = [low[0].min(qx), low[1].min(qy)];
+                high = [high[0].max(qx), high[1].max(qy)];
+            }
+        }
+    } else {
+        let d = corners(simd, &view.d, &lo, &hi);
+        let d_error = error(&view.d);
+        (least_w, w_error) = (splat(1.0), splat(0.0));
+        depth = largest(&d) + d_error;
+        clear = depth.simd_le(splat(1.0));
+        inside = (smallest(&d) - d_error).simd_le(splat(1.0)) & depth.simd_gt(splat(0.0));
+        low = [smallest(&x), smallest(&y)];
+        high = [largest(&x), largest(&y)];
+    }
+    let mut rect = [splat(0.0); 4];
+    let (mut within, mut uncut) = (clear, clear);
+    for (k, (size, error)) in [(view.width, x_error), (view.height, y_error)].into_iter().enumerate() {
+        let farthest = low[k].abs().max(high[k].abs());
+        let margin = (farthest * w_error + error) / least_w + farthest * (1.0 / (1 << 21) as f32);
+        // A square touched in its border alone counts.
+        let from = low[k] - margin - 1e-6;
+        let to = high[k] + margin + 1e-6;
+        within &= from.simd_gt(splat(-8000.0)) & to.simd_lt(splat(24000.0));
+        uncut &= from.simd_gt(splat(view.ring)) & to.simd_lt(splat(size - view.ring));
+        let seen = from.simd_le(splat(size + view.ring)) & to.simd_ge(splat(-view.ring));
+        inside &= seen | !clear;
+        rect[k] = from.floor().max(splat(0.0)).min(splat(size - 1.0));
+        rect[k + 2] = to.floor().min(splat(size - 1.0)).max(splat(0.0));
+    }
+    let mut inside_bits = inside.to_bitmask() as u16;
+    let clear_bits = clear.to_bitmask() as u16;
+    let crossing = inside_bits & !clear_bits;
+    if crossing != 0 {
+        inside_bits &= !(crossing & beyond_a_side(simd, view, &x, &y, &lo, &hi, [x_error, y_error]));
+    }
+    let ordered = if view.in_range { ordered(&lo, &hi).to_bitmask() as u16 } else { 0 };
+    let infinite = splat(f32::INFINITY);
+    BoxesOnScreen {
+        left: whole(rect[0]),
+        top: whole(rect[1]),
+        right: whole(rect[2]),
+        bottom: whole(rect[3]),
+        depth: (clear & mask32x16::from_bitmask(simd, u64::from(ordered))).select(depth, infinite).into(),
+        // What is no box may be anywhere.
+        inside: inside_bits | !ordered,
+        clear: within.to_bitmask() as u16 & ordered,
+        uncut: uncut.to_bitmask() as u16 & ordered,
+    }
+}
+
+/// Coordinates beyond this, metres, could overflow on their way; such a box is seen everywhere.
+const FARTHEST: f32 = 1e15;
+
+/// Lanes whose corners are in order and not too far away.
+#[inline(always)]
+fn ordered<S: Simd>(lo: &[f32x16<S>; 3], hi: &[f32x16<S>; 3]) -> mask32x16<S> {
+    let mut good = lo[0].simd_le(hi[0]);
+    for k in 0..3 {
+        let far = f32x16::splat(lo[k].token(), FARTHEST);
+        good = good & lo[k].simd_le(hi[k]) & lo[k].simd_ge(far * -1.0) & hi[k].simd_le(far);
+    }
+    good
+}
+
+/// Boxes, crossing the near plane, that lie wholly beyond one of the image's sides (planes through the eye).
+#[inline(always)]
+fn beyond_a_side<S: Simd>(
+    simd: S,
+    view: &BoxView,
+    x: &[f32x16<S>; 8],
+    y: &[f32x16<S>; 8],
+    lo: &[f32x16<S>; 3],
+    hi: &[f32x16<S>; 3],
+    error: [f32x16<S>; 2],
+) -> u16 {
+    if view.ring > 0.0 {
+        return 0;
+    }
+    let one = f32x16::splat(simd, 1.0);
+    let w = if view.perspective { corners(simd, &view.w, lo, hi) } else { [one; 8] };
+    let reach = [0, 1, 2].map(|k| lo[k].abs().max(hi[k].abs()));
+    let w_size = reach[0] * view.w[0].abs()
+        + reach[1] * view.w[1].abs()
+        + reach[2] * view.w[2].abs()
+        + view.w[3].abs();
+    let mut beyond = 0u16;
+    for (p, error, size) in [(x, error[0], view.width), (y, error[1], view.height)] {
+        for (bound, sign) in [(-0.01f32, 1.0f32), (size + 0.01, -1.0)] {
+            let slack = error + w_size * (bound.abs() * ROUNDING);
+            let mut most = f32x16::splat(simd, f32::NEG_INFINITY);
+            for c in 0..8 {
+                most = most.max((p[c] - w[c] * bound) * sign);
+            }
+            // Twice the bound, for the rounding of the difference itself.
+            beyond |= most.simd_lt(slack * -2.0).to_bitmask() as u16;
+        }
+    }
+    beyond
+}
+
+/// `row · corner` for the eight corners; bit 0 of the corner is x, bit 1 y, bit 2 z.
+#[inline(always)]
+fn corners<S: Simd>(_simd: S, row: &[f32; 4], lo: &[f32x16<S>; 3], hi: &[f32x16<S>; 3]) -> [f32x16<S>; 8] {
+    let x = [lo[0] * row[0] + row[3], hi[0] * row[0] + row[3]];
+    let y = [lo[1] * row[1], hi[1] * row[1]];
+    let z = [lo[2] * row[2], hi[2] * row[2]];
+    let xy = [x[0] + y[0], x[1] + y[0], x[0] + y[1], x[1] + y[1]];
+    [
+        xy[0] + z[0],
+        xy[1] + z[0],
+        xy[2] + z[0],
+        xy[3] + z[0],
+        xy[0] + z[1],
+        xy[1] + z[1],
+        xy[2] + z[1],
+        xy[3] + z[1],
+    ]
+}
+
+#[inline(always)]
+fn smallest<S: Simd>(v: &[f32x16<S>; 8]) -> f32x16<S> {
+    (v[0].min(v[1])).min(v[2].min(v[3])).min((v[4].min(v[5])).min(v[6].min(v[7])))
+}
+
+#[inline(always)]
+fn largest<S: Simd>(v: &[f32x16<S>; 8]) -> f32x16<S> {
+    (v[0].max(v[1])).max(v[2].max(v[3])).max((v[4].max(v[5])).max(v[6].max(v[7])))
+}
+
+#[inline(always)]
+fn whole<S: Simd>(v: f32x16<S>) -> [i32; 16] {
+    v.to_int::<fearless_simd::i32x16<S>>().into()
+}

@@ -1,0 +1,320 @@
+//! Drawing an occluder into a band of the image: the walk of its patches, nearest first, and each patch.
+
+use super::Drawn;
+use super::ask::{BoxView, project};
+use super::clip::{Clipped, EdgeOf, clip, doubled_area};
+use super::fill::{Joint, Outline, fill};
+use super::occluder::{ENDS, Face, Occluder, Patch};
+use super::place::{Placed, Placing};
+use super::surface::Surface;
+use crate::index::{Child, Slot};
+use crate::raster::ScreenFromObject;
+use fearless_simd::Simd;
+
+/// Rows of the image, and what is needed to draw into them.
+#[derive(Clone, Debug)]
+pub(super) struct Band {
+    pub surface: Surface,
+    joint: Joint,
+    placed: Placed,
+    /// For each face of a patch +1 or −1, its turn on the screen, or 0 if it is not drawn.
+    turns: Vec<i8>,
+    clipped: Vec<(u32, [Option<Clipped>; 2])>,
+    open: Vec<Open>,
+}
+
+/// A part of an occluder's tree that may show.
+#[derive(Clone, Copy, Debug)]
+struct Open {
+    slot: Slot,
+    rect: [i32; 4],
+    depth: f32,
+    clear: bool,
+}
+
+/// An occluder in its place.
+#[derive(Clone, Copy)]
+pub(super) struct Standing<'a> {
+    pub occluder: &'a Occluder,
+    pub at: ScreenFromObject,
+    pub boxes: BoxView,
+    /// How far the eye may move relative to it, metres, and pixels a metre at distance 1 across the image.
+    pub margin: Option<(f64, f64)>,
+}
+
+impl Band {
+    pub fn new(width: u32, top: u32, height: u32) -> Band {
+        let surface = Surface::new(width, top, height);
+        let joint = Joint::new(&surface);
+        Band { surface, joint, placed: Placed::default(), turns: vec![], clipped: vec![], open: vec![] }
+    }
+
+    /// The part of an image's rectangle (inclusive) in this band, in its own rows.
+    #[inline(always)]
+    pub fn rows_of(&self, [left, top, right, bottom]: [i32; 4]) -> Option<[i32; 4]> {
+        let rect = [
+            left,
+            (top - self.surface.top).max(0),
+            right,
+            (bottom - self.surface.top).min(self.surface.height - 1),
+        ];
+        (rect[1] <= rect[3]).then_some(rect)
+    }
+
+    /// Whether an image's rectangle (inclusive) is hidden at `depth`, as far as this band knows.
+    #[inline(always)]
+    pub fn hides<S: Simd>(&self, simd: S, rect: [i32; 4], depth: f32) -> bool {
+        self.rows_of(rect).is_none_or(|rect| self.surface.all_nearer(simd, rect, depth))
+    }
+
+    /// Draws the patches that may show, nearest first.
+    #[inline(always)]
+    pub fn draw<S: Simd>(&mut self, simd: S, standing: &Standing, drawn: &mut Drawn) {
+        let tree = &standing.occluder.tree;
+        if tree.nodes.is_empty() {
+            return;
+        }
+        self.open.clear();
+        self.visit(simd, standing, 0);
+        while let Some(open) = self.open.pop() {
+            if self.hides(simd, open.rect, open.depth) {
+                drawn.hidden += 1;
+                continue;
+            }
+            match open.slot.child() {
+                Child::Node(node) => self.visit(simd, standing, node),
+                Child::Leaf(patch) => {
+                    let patch = &standing.occluder.patches[patch as usize];
+                    simd.vectorize(
+                        #[inline(always)]
+                        || self.draw_patch(simd, standing, patch, open.clear, drawn),
+                    );
+                }
+            }
+        }
+    }
+
+    /// Opens the children of a node that the image may show, the nearest last.
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, simd: S, standing: &Standing, node: u32) {
+        let node = &standing.occluder.tree.nodes[node as usize];
+        let boxes = simd.vectorize(
+            #[inline(always)]
+            || project(simd, &standing.boxes, &node.min, &node.max),
+        );
+        let mut rest = u32::from(boxes.inside) & (0xFFFF >> (16 - node.used));
+        let first = self.open.len();
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            let rect = [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]];
+            let clear = boxes.clear >> lane & 1 == 1;
+            if node.child[lane] == Slot::EMPTY || self.rows_of(rect).is_none() {
+                continue;
+            }
+            let open = Open { slot: node.child[lane], rect, depth: boxes.depth[lane], clear };
+            self.open.push(open);
+            let mut at = self.open.len() - 1;
+            while at > first && self.open[at - 1].depth > open.depth {
+                self.open.swap(at - 1, at);
+                at -= 1;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn draw_patch<S: Simd>(
+        &mut self,
+        simd: S,
+        standing: &Standing,
+        patch: &Patch,
+        clear: bool,
+        drawn: &mut Drawn,
+    ) {
+        let bounds = patch.bounds.to_aabb();
+        let (center, half) = (bounds.center().to_array(), (bounds.size() * 0.5).to_array());
+        let near = standing.at.d[3];
+        let least_w = if !standing.at.perspective {
+            1.0
+        } else if clear {
+            let w = &standing.at.w;
+            let least = (0..3).fold(w[3], |sum, k| sum + w[k] * center[k] - w[k].abs() * half[k]);
+            least.max(near)
+        } else {
+            near
+        };
+        let reach = patch.bounds.reach();
+        let Some(placing) = Placing::new(&standing.at, reach, least_w) else { return };
+        let faces = &standing.occluder.faces[patch.first_face as usize..][..patch.faces as usize];
+        self.clipped.clear();
+        if clear {
+            self.placed_turns(simd, standing, patch, &placing, faces);
+        } else {
+            self.clipped_turns(standing, patch, &placing, faces);
+        }
+        let Some(margin_px) = self.margin_px(standing) else { return };
+        drawn.patches += 1;
+        for (f, face) in faces.iter().enumerate() {
+            if self.turns[f] == 0 {
+                continue;
+            }
+            drawn.faces += 1;
+            let ends = ends_of(face, f, &self.turns);
+            if let Ok(at) = self.clipped.binary_search_by_key(&(f as u32), |c| c.0) {
+                let pieces = self.clipped[at].1;
+                for (p, piece) in pieces.iter().enumerate() {
+                    let Some(piece) = piece else { continue };
+                    let ends =
+                        if face.corners == 3 { ends } else { ends_of_half(ends, p, pieces[1 - p].is_none()) };
+                    fan(piece, i32::from(self.turns[f]), ends, |outline| {
+                        fill(simd, &mut self.surface, &mut self.joint, outline, placing.slack, margin_px > 0);
+                    });
+                }
+                continue;
+            }
+            let outline = Outline {
+                corner: face.corner.map(|v| self.placed.corner(v as usize)),
+                corners: usize::from(face.corners),
+                turn: i32::from(self.turns[f]),
+                ends,
+            };
+            fill(simd, &mut self.surface, &mut self.joint, &outline, placing.slack, margin_px > 0);
+        }
+        if margin_px > 0 {
+            self.joint.finish_eroded(simd, &mut self.surface, self.placed.nearest, margin_px);
+        } else {
+            self.joint.finish(simd, &mut self.surface, self.placed.nearest);
+        }
+        self.surface.refresh(simd);
+    }
+
+    /// Pixels that the patch's outline may move by under the margin; `None` if it is too near to say.
+    fn margin_px(&self, standing: &Standing) -> Option<i32> {
+        let Some((metres, pixels)) = standing.margin else { return Some(0) };
+        let distance = if standing.at.perspective {
+            standing.at.d[3] / (f64::from(self.placed.nearest) * 1.000_001)
+        } else {
+            1.0
+        };
+        let reach = (metres * pixels / distance).ceil() + 1.0;
+        (reach <= 256.0).then_some(reach as i32)
+    }
+
+    /// Places a patch that needs no clipping and says which way its faces turn.
+    #[inline(always)]
+    fn placed_turns<S: Simd>(
+        &mut self,
+        simd: S,
+        standing: &Standing,
+        patch: &Patch,
+        placing: &Placing,
+        faces: &[Face],
+    ) {
+        placing.place(simd, &standing.occluder.vertices, patch, &mut self.placed);
+        let nearest = self.placed.depth.iter().fold(0.0f32, |n, &d| n.max(d));
+        // The bounds of depths themselves are rounded down.
+        self.placed.nearest = nearest;
+        let front = standing.at.front_sign as i32;
+        self.turns.clear();
+        for face in faces {
+            let c = face.corner.map(|v| self.placed.corner(v as usize));
+            let sign = if face.corners == 3 {
+                Some(doubled_area(&c[0], &c[1], &c[2]).signum() as i32)
+            } else {
+                let t = [0, 1, 2, 3].map(|k| doubled_area(&c[k], &c[(k + 1) % 4], &c[(k + 2) % 4]));
+                let (low, high) = (t[0].min(t[1]).min(t[2].min(t[3])), t[0].max(t[1]).max(t[2].max(t[3])));
+                // Turns that differ: seen so nearly edge-on that it is no convex outline.
+                (low >= 0 || high <= 0).then_some(high.signum() as i32 + low.signum() as i32)
+            };
+            self.turns.push(turn_of(sign.map(i32::signum), front, face.two_sided));
+        }
+    }
+
+    /// Clips a patch's faces one by one and says which way what is left of them turns.
+    #[inline(never)]
+    fn clipped_turns(&mut self, standing: &Standing, patch: &Patch, placing: &Placing, faces: &[Face]) {
+        let vertices = &standing.occluder.vertices;
+        let point = |v: u32| {
+            let i = (patch.first_vertex + v) as usize;
+            let p = [vertices.x[i], vertices.y[i], vertices.z[i]].map(f64::from);
+            placing.at.point(p)
+        };
+        let front = standing.at.front_sign as i32;
+        self.turns.clear();
+        self.placed.nearest = 0.0;
+        for (f, face) in faces.iter().enumerate() {
+            let c = face.corner.map(point);
+            if !c.as_flattened().iter().all(|c| c.is_finite()) {
+                self.turns.push(0);
+                continue;
+            }
+            let two = face.corners == 4;
+            let pieces =
+                [clip([c[0], c[1], c[2]], placing), two.then(|| clip([c[0], c[2], c[3]], placing)).flatten()];
+            let mut signs = pieces.iter().flatten().map(|p| p.sign);
+            let first = signs.next();
+            let sign = first.filter(|&s| s != 0 && signs.all(|other| other == s));
+            let turn = turn_of(Some(sign.unwrap_or(0)), front, face.two_sided);
+            // Where the pieces disagree, and where nothing is left, nothing is drawn.
+            self.turns.push(if sign.is_some() { turn } else { 0 });
+            if sign.is_some() && turn != 0 {
+                for piece in pieces.iter().flatten() {
+                    let depths = piece.corner[..piece.len].iter().map(|c| c.0.depth);
+                    self.placed.nearest = depths.fold(self.placed.nearest, f32::max);
+                }
+                self.clipped.push((f as u32, pieces));
+            }
+        }
+    }
+}
+
+/// +1 or −1 for a face that is drawn, else 0. `sign` is that of its area on the screen, `None` if it has none.
+#[inline(always)]
+fn turn_of(sign: Option<i32>, front: i32, two_sided: bool) -> i8 {
+    match sign {
+        None => 0,
+        // Edge-on: it covers nothing, but joins its neighbours.
+        Some(0) => front as i8,
+        Some(s) if s == front || two_sided => s as i8,
+        Some(_) => 0,
+    }
+}
+
+/// Bit k: the face that is drawn across edge k does not continue this one.
+#[inline(always)]
+fn ends_of(face: &Face, f: usize, turns: &[i8]) -> u32 {
+    let mut ends = 0;
+    for k in 0..usize::from(face.corners) {
+        let across = face.across[k];
+        if across == ENDS || turns[across as usize] != turns[f] {
+            ends |= 1 << k;
+        }
+    }
+    ends
+}
+
+/// The ends of one half of a face of four: corners 0, 1, 2 or 0, 2, 3. The diagonal ends where the other half
+/// is gone.
+fn ends_of_half(ends: u32, half: usize, alone: bool) -> u32 {
+    if half == 0 { (ends & 3) | u32::from(alone) << 2 } else { (ends >> 1 & 6) | u32::from(alone) }
+}
+
+/// The triangles of a clipped piece's fan, whose diagonals are shared. `ends` are those of the triangle.
+fn fan(piece: &Clipped, turn: i32, ends: u32, mut each: impl FnMut(&Outline)) {
+    let n = piece.len;
+    let ends_at = |i: usize| match piece.corner[i].1 {
+        EdgeOf::Cut => 1,
+        EdgeOf::Triangle(k) => ends >> k & 1,
+    };
+    for i in 1..n - 1 {
+        let corner = [piece.corner[0].0, piece.corner[i].0, piece.corner[i + 1].0, piece.corner[0].0];
+        let mut bits = ends_at(i) << 1;
+        if i == 1 {
+            bits |= ends_at(0);
+        }
+        if i == n - 2 {
+            bits |= ends_at(n - 1) << 2;
+        }
+        each(&Outline { corner, corners: 3, turn, ends: bits });
+    }
+}

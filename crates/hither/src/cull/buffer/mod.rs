@@ -1,0 +1,244 @@
+//! The conservative occlusion buffer: what it calls hidden is hidden in the continuous image.
+//!
+//! # What is promised
+//!
+//! [`Verdict::Hidden`] means: every ray from the eye to a point of what was asked about meets an occluder
+//! before that point. Whatever the resolution of the buffer, whatever the order of drawing. The error is on the
+//! side of *visible*. Three bounds carry it:
+//!
+//! - **coverage**: a pixel counts as covered only if all of its square is;
+//! - **depth**: a pixel holds no more than the depth of the nearest surface anywhere in its square;
+//! - **extent**: what is asked about is taken as the rectangle of all pixels whose closed squares it may touch,
+//!   at the nearest depth it may reach.
+//!
+//! # Why edges inside a surface do not leak, and silhouettes do not hide too much
+//!
+//! An occluder is cut into *patches*, pieces connected by paired edges (two faces, opposite directions). On the
+//! screen, the drawn faces of a patch all turn the same way, so together they are a chain whose boundary are the
+//! edges that are not paired with a drawn face of the same turn: the silhouette, and where the surface ends.
+//! Paired edges cancel. Let `N(q)` be how many faces cover a point q. N changes only across the boundary. Let c be
+//! a pixel's centre and q any point of its square; the straight way from c to q crosses a boundary edge at most
+//! once, and loses a layer only where it comes from the edge's inner side. So
+//!
+//! ```text
+//! N(q) ≥ N(c) − (boundary edges that touch the square and have c on their inner side)
+//! ```
+//!
+//! and where the right side is at least 1 the whole square is covered by the patch, if no single face covers it.
+//! Counting N(c) takes the fill rule on snapped coordinates, exact in integers: a point on a shared edge belongs
+//! to one of the two faces. A face all of whose edges near a pixel are boundary may be left out of the chain
+//! there: its other edges do not come near, so nobody else's sum changes.
+//!
+//! *Snapping.* Corners are off by at most a slack of δ (1/256 pixel, more where f64 is not enough: see
+//! [`place`]). Moving them to where they truly are is a homotopy of the chain. N at c changes only if an edge
+//! passes over c; then c is within δ of it, the edge touches the square, and it has been taken off the count,
+//! because *touches* widens the square by δ and *inner side* begins δ beyond the edge. An edge that passes over
+//! c and is then crossed on the way to q gives back what it took. A face that snapping turned over counts as it
+//! lies: N becomes a sum with signs, and where that is at least 1, a face that truly turns this way is there.
+//!
+//! *Depth.* Every face of the chain that may touch the square, widened by δ, takes part in the minimum. Of a
+//! face, the plane through three snapped corners is lowered until it is below every true corner. A true point
+//! of the face is a mean of true corners, hence not below the plane there; within a pixel and δ the plane falls
+//! by at most `(|a| + |b|)·(½ + δ)`.
+//!
+//! *Cutting* at the near plane and at the guard band replaces the chain by another with the same cut points for
+//! both owners of an edge; what the near plane cuts ends there.
+//!
+//! # A moving eye
+//!
+//! With a margin of r metres a patch is eroded by ρ pixels, and each pixel takes the least depth within ρ, where
+//! ρ bounds how far on the image a displacement of r can move a point no nearer than the patch. Let e be the
+//! eye of the buffer, e' within r of it, b hidden. A point x' of the segment e'b is within r of the point x of eb
+//! that divides it alike, and x lies on b's ray. As long as x' is no nearer than the nearest point of the patch,
+//! it is within ρ pixels of b on e's image, where the patch covers everything at least once and lies wholly
+//! before b. Going from b towards e', x' begins behind the patch and ends before it, and all the while stays
+//! where N ≥ 1: it crosses the patch. Motion of an occluder by m adds m to r; boxes are widened by 2m.
+
+mod ask;
+mod clip;
+mod draw;
+mod fill;
+mod occluder;
+mod place;
+mod queries;
+mod shared;
+mod surface;
+
+pub use occluder::{Occluder, OccluderError, Sides};
+pub use queries::{Boxes, ScreenRect};
+pub use shared::SharedBuffer;
+
+use super::Verdict;
+use crate::conventions::{Projection, View, ViewError};
+use crate::raster::ScreenFromObject;
+use ask::BoxView;
+use draw::{Band, Standing};
+use fearless_simd::{Level, dispatch};
+use glam::DAffine3;
+
+/// What may be chosen about an [`OcclusionBuffer`].
+#[derive(Clone, Copy, Debug)]
+pub struct OcclusionOptions {
+    /// How far the eye may move, metres, while answers are to stay true. It must not turn.
+    pub eye_moves: f64,
+    /// How far each object, occluder or not, may move, metres, while answers are to stay true.
+    pub objects_move: f64,
+    /// Instruction set; the best that the machine has by default. Answers do not depend on it.
+    pub level: Level,
+}
+
+impl Default for OcclusionOptions {
+    fn default() -> Self {
+        OcclusionOptions { eye_moves: 0.0, objects_move: 0.0, level: Level::new() }
+    }
+}
+
+/// What drawing an occluder came to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Drawn {
+    /// Connected pieces that were drawn.
+    pub patches: u64,
+    /// Boxes around pieces that were found hidden beforehand.
+    pub hidden: u64,
+    /// Faces (triangles, and pairs of them that form a quadrilateral) that were drawn.
+    pub faces: u64,
+}
+
+impl std::ops::AddAssign for Drawn {
+    fn add_assign(&mut self, o: Drawn) {
+        self.patches += o.patches;
+        self.hidden += o.hidden;
+        self.faces += o.faces;
+    }
+}
+
+/// The buffer's sizes or views differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("two occlusion buffers can be merged only if they have the same view and the same margins")]
+pub struct CannotMerge;
+
+/// A conservative occlusion buffer: draw occluders, ask what they hide, in any order. See the module's page for
+/// what *hidden* means and why it is true.
+///
+/// Asking takes `&self`, so any number of threads may ask at once; [`SharedBuffer`] lets them draw meanwhile.
+#[derive(Clone, Debug)]
+pub struct OcclusionBuffer {
+    frame: Frame,
+    band: Band,
+}
+
+/// What all bands of an image share.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    pub view: View,
+    pub options: OcclusionOptions,
+    pub screen_from_world: ScreenFromObject,
+}
+
+impl Frame {
+    fn new(view: &View, options: &OcclusionOptions) -> Result<Frame, ViewError> {
+        view.validate()?;
+        let moves = [options.eye_moves, options.objects_move];
+        if !moves.iter().all(|m| m.is_finite() && *m >= 0.0) {
+            return Err(ViewError::Camera("what moves must move by a finite distance that is not negative"));
+        }
+        Ok(Frame { view: *view, options: *options, screen_from_world: ScreenFromObject::of_view(view) })
+    }
+
+    /// Pixels a metre at distance 1 covers anywhere in the image.
+    fn pixels_a_metre(&self) -> f64 {
+        let scale = self.view.pixels_per_unit();
+        match self.view.projection {
+            Projection::Orthographic { .. } => scale,
+            Projection::Perspective { .. } => {
+                let half = f64::from(self.view.width.max(self.view.height)) * 0.5 / scale;
+                // Both directions across the image, and along the ray.
+                scale * (1.0 + half * half).sqrt()
+            }
+        }
+    }
+
+    fn margin(&self) -> Option<(f64, f64)> {
+        let metres = self.options.eye_moves + self.options.objects_move;
+        (metres > 0.0).then(|| (metres, self.pixels_a_metre()))
+    }
+
+    fn standing<'a>(&self, occluder: &'a Occluder, world_from_object: &DAffine3) -> Standing<'a> {
+        let at = self.screen_from_world.after(world_from_object);
+        let boxes = BoxView::new(&at, self.view.width, self.view.height);
+        Standing { occluder, at, boxes, margin: self.margin() }
+    }
+}
+
+impl OcclusionBuffer {
+    /// An empty buffer for `view`, of its size.
+    pub fn new(view: &View, options: &OcclusionOptions) -> Result<OcclusionBuffer, ViewError> {
+        let frame = Frame::new(view, options)?;
+        Ok(OcclusionBuffer { frame, band: Band::new(view.width, 0, view.height) })
+    }
+
+    /// Empties the buffer and looks from another view. Keeps its memory if the size stays.
+    pub fn look(&mut self, view: &View) -> Result<(), ViewError> {
+        let frame = Frame::new(view, &self.frame.options)?;
+        if (view.width, view.height) == (self.frame.view.width, self.frame.view.height) {
+            self.band.surface.clear();
+        } else {
+            self.band = Band::new(view.width, 0, view.height);
+        }
+        self.frame = frame;
+        Ok(())
+    }
+
+    /// Makes the buffer empty. Cost: a byte or two a pixel block, not the pixels.
+    pub fn clear(&mut self) {
+        self.band.surface.clear();
+    }
+
+    /// The view it was made for.
+    pub fn view(&self) -> &View {
+        &self.frame.view
+    }
+
+    /// What was chosen.
+    pub fn options(&self) -> &OcclusionOptions {
+        &self.frame.options
+    }
+
+    /// Draws an occluder. `world_from_object` may be any affine map; one that mirrors keeps fronts fronts.
+    pub fn draw(&mut self, occluder: &Occluder, world_from_object: &DAffine3) -> Drawn {
+        let standing = self.frame.standing(occluder, world_from_object);
+        let mut drawn = Drawn::default();
+        let band = &mut self.band;
+        dispatch!(self.frame.options.level, simd => band.draw(simd, &standing, &mut drawn));
+        drawn
+    }
+
+    /// Adds what another buffer of the same view holds: afterwards, what either hid is hidden.
+    pub fn merge(&mut self, other: &OcclusionBuffer) -> Result<(), CannotMerge> {
+        let (a, b) = (&self.frame, &other.frame);
+        let moves = |f: &Frame| (f.options.eye_moves, f.options.objects_move);
+        if a.view != b.view || moves(a) != moves(b) {
+            return Err(CannotMerge);
+        }
+        let surface = &mut self.band.surface;
+        dispatch!(self.frame.options.level, simd => surface.merge(simd, &other.band.surface));
+        Ok(())
+    }
+
+    /// What pixel (x, y) holds: all of it is covered at this depth or nearer; 0 where it is not covered.
+    pub fn depth(&self, x: u32, y: u32) -> f32 {
+        self.band.surface.depth(x, y)
+    }
+
+    /// All depths, row by row.
+    pub fn depths(&self) -> Vec<f32> {
+        let view = &self.frame.view;
+        (0..view.height)
+            .flat_map(|y| (0..view.width).map(move |x| (x, y)))
+            .map(|(x, y)| self.depth(x, y))
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

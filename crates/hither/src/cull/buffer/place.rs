@@ -1,0 +1,137 @@
+//! Vertices onto the screen: f64, snapped to 1/256 pixel, with the depth rounded away from the eye.
+
+use super::fill::Corner;
+use super::occluder::{Patch, Vertices};
+use crate::raster::ScreenFromObject;
+use fearless_simd::{Simd, f32x16, f64x8, prelude::*};
+
+/// Coordinates beyond this many pixels from the image's corner are clipped away: edges then fit 64 bits, and
+/// their steps within a tile 32.
+pub(super) const GUARD_MIN: f64 = -8192.0;
+pub(super) const GUARD_MAX: f64 = 24576.0;
+
+/// A patch's vertices on the screen.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Placed {
+    /// 1/256 pixel.
+    pub x: Vec<i32>,
+    pub y: Vec<i32>,
+    /// No larger than the depth of the vertex.
+    pub depth: Vec<f32>,
+    /// The largest of the depths.
+    pub nearest: f32,
+}
+
+impl Placed {
+    #[inline(always)]
+    pub fn corner(&self, vertex: usize) -> Corner {
+        Corner { x: self.x[vertex], y: self.y[vertex], depth: self.depth[vertex] }
+    }
+}
+
+/// A transform with what its arithmetic may be off by.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placing {
+    pub at: ScreenFromObject,
+    /// How far a snapped point may be from the true one, 1/256 pixel.
+    pub slack: i32,
+    /// Factor below 1 that makes a depth no larger than the true one.
+    pub shrink: f64,
+}
+
+impl Placing {
+    /// For points whose coordinates are at most `reach` in magnitude and whose W is at least `least_w`. `None`
+    /// where f64 could not tell where on the screen they are.
+    ///
+    /// *Bound.* A dot product of three terms and a constant in f64, after coefficients that went through two
+    /// products of matrices, is off by at most 16·2⁻⁵³ of the sum of the terms' magnitudes; a quotient's
+    /// error follows from the numerator's and W's.
+    pub fn new(at: &ScreenFromObject, reach: [f64; 3], least_w: f64) -> Option<Placing> {
+        let size = |r: &[f64; 4]| {
+            (r[0].abs() * reach[0] + r[1].abs() * reach[1] + r[2].abs() * reach[2] + r[3].abs())
+                * 2f64.powi(-49)
+        };
+        let w_error = if at.perspective { size(&at.w) / least_w } else { 0.0 };
+        let off = size(&at.x).max(size(&at.y)) / least_w + GUARD_MAX * 256.0 * w_error;
+        let depth_error = if at.perspective { 0.0 } else { size(&at.d) };
+        // Half a unit for snapping; the rest, rounded up.
+        let slack = 1.0 + (off * 2.0).floor();
+        if !(slack < 4096.0 && w_error < 1e-3 && depth_error < 1e-6) {
+            return None;
+        }
+        Some(Placing { at: *at, slack: slack as i32, shrink: 1.0 - 2f64.powi(-22) - 2.0 * w_error })
+    }
+
+    /// Depth that is no larger than D/W, in f32. An orthographic depth has an absolute error besides, and is
+    /// negative beyond the far plane.
+    #[inline(always)]
+    pub fn depth(&self, d: f64) -> f32 {
+        (if self.at.perspective { d * self.shrink } else { d - (d.abs() * (1.0 - self.shrink) + 2e-6) })
+            as f32
+    }
+
+    /// All vertices of a patch whose box lies before the near plane and inside the guard band.
+    #[inline(always)]
+    pub fn place<S: Simd>(&self, simd: S, vertices: &Vertices, patch: &Patch, placed: &mut Placed) {
+        let (first, count) = (patch.first_vertex as usize, patch.vertices as usize);
+        placed.x.resize(count, 0);
+        placed.y.resize(count, 0);
+        placed.depth.resize(count, 0.0);
+        let round = f64x8::splat(simd, ROUND);
+        let mut done = 0;
+        while done < count {
+            // Sixteen at a time, or the last eight twice.
+            let wide = done + 16 <= count;
+            let (lo, hi) = (first + done, if wide { first + done + 8 } else { first + done });
+            let load = |list: &[f32]| {
+                let mut both = [0.0f32; 16];
+                both[..8].copy_from_slice(&list[lo..lo + 8]);
+                both[8..].copy_from_slice(&list[hi..hi + 8]);
+                simd.widen_f32x16(f32x16::from_slice(simd, &both))
+            };
+            let (x, y, z) = (load(&vertices.x), load(&vertices.y), load(&vertices.z));
+            let low = self.project(simd, [x.0, y.0, z.0]);
+            let high = self.project(simd, [x.1, y.1, z.1]);
+            let sx: fearless_simd::i32x16<S> =
+                simd.narrow_i64x8((low[0] + round).bitcast(), (high[0] + round).bitcast());
+            let sy: fearless_simd::i32x16<S> =
+                simd.narrow_i64x8((low[1] + round).bitcast(), (high[1] + round).bitcast());
+            let depth = simd.narrow_f64x8(low[2], high[2]);
+            if wide {
+                sx.store_slice(&mut placed.x[done..done + 16]);
+                sy.store_slice(&mut placed.y[done..done + 16]);
+                depth.store_slice(&mut placed.depth[done..done + 16]);
+                done += 16;
+            } else {
+                let (x, y, d): ([i32; 16], [i32; 16], [f32; 16]) = (sx.into(), sy.into(), depth.into());
+                placed.x[done..].copy_from_slice(&x[..8]);
+                placed.y[done..].copy_from_slice(&y[..8]);
+                placed.depth[done..].copy_from_slice(&d[..8]);
+                done += 8;
+            }
+        }
+    }
+
+    /// Screen x and y in 1/256 pixel, and depth.
+    #[inline(always)]
+    fn project<S: Simd>(&self, simd: S, p: [f64x8<S>; 3]) -> [f64x8<S>; 3] {
+        let at = &self.at;
+        let (x, y) = (dot(simd, &at.x, &p), dot(simd, &at.y, &p));
+        if at.perspective {
+            let reciprocal = f64x8::splat(simd, 1.0) / dot(simd, &at.w, &p);
+            [x * reciprocal, y * reciprocal, reciprocal * (at.d[3] * self.shrink)]
+        } else {
+            let d = dot(simd, &at.d, &p);
+            [x, y, d - (d.abs() * (1.0 - self.shrink) + 2e-6)]
+        }
+    }
+}
+
+/// Adding this rounds to a whole number, ties to even, whose low 32 bits are the sum's; for |v| < 2³¹.
+const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
+
+#[inline(always)]
+fn dot<S: Simd>(simd: S, row: &[f64; 4], p: &[f64x8<S>; 3]) -> f64x8<S> {
+    let xy = f64x8::splat(simd, row[0]) * p[0] + f64x8::splat(simd, row[1]) * p[1];
+    (xy + f64x8::splat(simd, row[2]) * p[2]) + f64x8::splat(simd, row[3])
+}

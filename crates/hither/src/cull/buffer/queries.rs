@@ -1,0 +1,313 @@
+//! Asking: boxes in batches, single boxes, spheres, rectangles of the screen, other meshes.
+
+use super::ask::{BoxView, BoxesOnScreen, project};
+use super::draw::Band;
+use super::{Frame, Occluder, OcclusionBuffer, Verdict};
+use crate::conventions::Projection;
+use crate::geometry::Aabb;
+use crate::index::Box3;
+use fearless_simd::{Simd, dispatch};
+use glam::{DAffine3, DVec3};
+
+/// Boxes to ask about, sixteen together. f32, rounded outwards.
+///
+/// A box with a corner that is no finite number, or beyond 10¹⁵ metres, is never hidden; nor is one whose
+/// smallest coordinates exceed its largest.
+#[derive(Clone, Debug, Default)]
+pub struct Boxes {
+    pub(super) sixteen: Vec<SixteenBoxes>,
+    len: usize,
+}
+
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(super) struct SixteenBoxes {
+    pub min: [[f32; 16]; 3],
+    pub max: [[f32; 16]; 3],
+}
+
+impl Boxes {
+    /// Adds a box.
+    pub fn push(&mut self, bounds: &Aabb) {
+        let lane = self.len % 16;
+        if lane == 0 {
+            self.sixteen.push(SixteenBoxes { min: [[0.0; 16]; 3], max: [[0.0; 16]; 3] });
+        }
+        self.len += 1;
+        let b = Box3::around(bounds);
+        if let Some(sixteen) = self.sixteen.last_mut() {
+            for axis in 0..3 {
+                sixteen.min[axis][lane] = b.min[axis];
+                sixteen.max[axis][lane] = b.max[axis];
+            }
+        }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.sixteen.clear();
+        self.len = 0;
+    }
+}
+
+impl FromIterator<Aabb> for Boxes {
+    fn from_iter<T: IntoIterator<Item = Aabb>>(bounds: T) -> Boxes {
+        let mut boxes = Boxes::default();
+        bounds.into_iter().for_each(|b| boxes.push(&b));
+        boxes
+    }
+}
+
+/// A rectangle of the screen at a depth, in pixels of the image; it may reach beyond it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScreenRect {
+    /// Left border.
+    pub left: f64,
+    /// Top border.
+    pub top: f64,
+    /// Right border.
+    pub right: f64,
+    /// Bottom border.
+    pub bottom: f64,
+    /// The nearest it comes: [`Projection`] says how depth is counted.
+    pub depth: f32,
+}
+
+impl OcclusionBuffer {
+    /// Asks about many boxes of world space: one verdict each, in their order, into `verdicts`.
+    pub fn ask(&self, boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
+        let bands = [&self.band];
+        self.frame.ask(&bands, boxes, verdicts);
+    }
+
+    /// Asks about one box of world space.
+    pub fn ask_box(&self, bounds: &Aabb) -> Verdict {
+        self.frame.ask_box(&[&self.band], bounds)
+    }
+
+    /// Asks about a ball. A radius or centre that is no finite number is never hidden.
+    pub fn ask_sphere(&self, center: DVec3, radius: f64) -> Verdict {
+        self.frame.ask_sphere(&[&self.band], center, radius)
+    }
+
+    /// Asks about a rectangle of the screen.
+    pub fn ask_rect(&self, rect: &ScreenRect) -> Verdict {
+        self.frame.ask_rect(&[&self.band], rect)
+    }
+
+    /// Asks about another mesh, at the cost of drawing its boxes: hidden if each of its faces is. Finer than a
+    /// box around it.
+    pub fn ask_mesh(&self, mesh: &Occluder, world_from_object: &DAffine3) -> Verdict {
+        self.frame.ask_mesh(&[&self.band], mesh, world_from_object)
+    }
+}
+
+impl Frame {
+    /// Pixels beyond the image's border that an eye within the margin may come to see: all of them matter, so
+    /// what the border cuts is never hidden then.
+    fn box_view(&self) -> BoxView {
+        let mut view = BoxView::new(&self.screen_from_world, self.view.width, self.view.height);
+        if self.margin().is_some() {
+            view.ring = 1e6;
+        }
+        view
+    }
+
+    /// How far boxes are widened, metres.
+    fn widening(&self) -> f32 {
+        let metres = self.options.objects_move * 2.0;
+        (metres as f32).next_up() * f32::from(u8::from(metres > 0.0))
+    }
+
+    pub(super) fn ask(&self, bands: &[&Band], boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
+        verdicts.clear();
+        verdicts.reserve(boxes.sixteen.len() * 16);
+        dispatch!(self.options.level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.ask_all(simd, bands, boxes, verdicts),
+        ));
+        verdicts.truncate(boxes.len);
+    }
+
+    #[inline(always)]
+    fn ask_all<S: Simd>(&self, simd: S, bands: &[&Band], boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
+        let (view, widening) = (self.box_view(), self.widening());
+        for sixteen in &boxes.sixteen {
+            let on_screen = if widening > 0.0 {
+                let wide = sixteen.widened(widening);
+                project(simd, &view, &wide.min, &wide.max)
+            } else {
+                project(simd, &view, &sixteen.min, &sixteen.max)
+            };
+            let mut out = [Verdict::Outside; 16];
+            let mut rest = on_screen.inside;
+            while rest != 0 {
+                let lane = rest.trailing_zeros() as usize;
+                rest &= rest - 1;
+                out[lane] = verdict_of(simd, bands, &on_screen, lane, view.ring > 0.0);
+            }
+            verdicts.extend(out);
+        }
+    }
+
+    pub(super) fn ask_box(&self, bands: &[&Band], bounds: &Aabb) -> Verdict {
+        let mut boxes = Boxes::default();
+        boxes.push(bounds);
+        let mut verdicts = Vec::with_capacity(16);
+        self.ask(bands, &boxes, &mut verdicts);
+        verdicts[0]
+    }
+
+    pub(super) fn ask_sphere(&self, bands: &[&Band], center: DVec3, radius: f64) -> Verdict {
+        let c = self.view.view_from_world.transform_point3(center);
+        let size = c.abs().max_element() + center.abs().max_element();
+        // Rounding of the transform, and of what follows.
+        let radius = radius.abs() + self.options.objects_move * 2.0 + size * 1e-12;
+        if !(c.is_finite() && radius.is_finite()) {
+            return Verdict::Visible;
+        }
+        let scale = self.view.pixels_per_unit();
+        let (x, y, depth) = match self.view.projection {
+            Projection::Perspective { near, .. } => {
+                let distance = -c.z;
+                if distance + radius < near {
+                    return Verdict::Outside;
+                }
+                if distance - radius <= near {
+                    return Verdict::Visible;
+                }
+                // Tangents from the eye to the circle in which the axis' plane through the eye cuts the ball.
+                let tangents = |a: f64| {
+                    let away = (a * a + distance * distance - radius * radius).sqrt() * radius;
+                    let below = distance * distance - radius * radius;
+                    [(a * distance - away) / below * scale, (a * distance + away) / below * scale]
+                };
+                (tangents(c.x), tangents(-c.y), near / (distance - radius))
+            }
+            Projection::Orthographic { near, far, .. } => {
+                let depth = (far + c.z + radius) / (far - near);
+                let tangents = |a: f64| [(a - radius) * scale, (a + radius) * scale];
+                if depth > 1.0 {
+                    let wholly = (far + c.z - radius) / (far - near) > 1.0;
+                    return if wholly { Verdict::Outside } else { Verdict::Visible };
+                }
+                (tangents(c.x), tangents(-c.y), depth)
+            }
+        };
+        let (w, h) = (f64::from(self.view.width) * 0.5, f64::from(self.view.height) * 0.5);
+        let slack = 1e-6 + 1e-9 * (x[0].abs() + x[1].abs() + y[0].abs() + y[1].abs());
+        let depth = (depth * (1.0 + 1e-9)) as f32;
+        self.ask_rect(
+            bands,
+            &ScreenRect {
+                left: x[0] + w - slack,
+                top: y[0] + h - slack,
+                right: x[1] + w + slack,
+                bottom: y[1] + h + slack,
+                depth: depth.next_up(),
+            },
+        )
+    }
+
+    pub(super) fn ask_rect(&self, bands: &[&Band], rect: &ScreenRect) -> Verdict {
+        let ScreenRect { left, top, right, bottom, depth } = *rect;
+        let (width, height) = (f64::from(self.view.width), f64::from(self.view.height));
+        if !(left <= right && top <= bottom) || depth.is_nan() {
+            return Verdict::Visible;
+        }
+        let moving = self.margin().is_some();
+        if moving && !(left > 0.0 && top > 0.0 && right < width && bottom < height) {
+            return Verdict::Visible;
+        }
+        if right < 0.0 || bottom < 0.0 || left > width || top > height || depth <= 0.0 {
+            return Verdict::Outside;
+        }
+        let pixel = |v: f64, size: f64| v.floor().clamp(0.0, size - 1.0) as i32;
+        // A border that runs between two pixels touches both.
+        let first = |v: f64, size: f64| pixel(v.ceil() - 1.0, size);
+        let rect = [first(left, width), first(top, height), pixel(right, width), pixel(bottom, height)];
+        let hidden = dispatch!(self.options.level, simd => bands.iter().all(|b| b.hides(simd, rect, depth)));
+        if hidden { Verdict::Hidden } else { Verdict::Visible }
+    }
+
+    pub(super) fn ask_mesh(&self, bands: &[&Band], mesh: &Occluder, world_from_object: &DAffine3) -> Verdict {
+        let vertices = &mesh.vertices;
+        let corner = |i: usize| DVec3::new(vertices.x[i].into(), vertices.y[i].into(), vertices.z[i].into());
+        let mut verdict = Verdict::Outside;
+        for patch in &mesh.patches {
+            let around = patch.bounds.to_aabb().transformed(world_from_object);
+            match self.ask_box(bands, &around) {
+                Verdict::Outside => continue,
+                Verdict::Hidden => {
+                    verdict = Verdict::Hidden;
+                    continue;
+                }
+                Verdict::Visible => {}
+            }
+            // Face by face; sixteen of their boxes are asked about together.
+            let faces = &mesh.faces[patch.first_face as usize..][..patch.faces as usize];
+            let boxes: Boxes = faces
+                .iter()
+                .map(|face| {
+                    let corners = &face.corner[..usize::from(face.corners)];
+                    let first = patch.first_vertex as usize;
+                    let points = corners
+                        .iter()
+                        .map(|&v| world_from_object.transform_point3(corner(first + v as usize)));
+                    let b = Aabb::around(points);
+                    // The transform's rounding: three products and sums.
+                    let slack = (b.min.abs().max(b.max.abs()) + world_from_object.translation.abs()) * 1e-14;
+                    Aabb { min: b.min - slack, max: b.max + slack }
+                })
+                .collect();
+            let mut verdicts = Vec::new();
+            self.ask(bands, &boxes, &mut verdicts);
+            if verdicts.contains(&Verdict::Visible) {
+                return Verdict::Visible;
+            }
+            if verdicts.contains(&Verdict::Hidden) {
+                verdict = Verdict::Hidden;
+            }
+        }
+        verdict
+    }
+}
+
+#[inline(always)]
+fn verdict_of<S: Simd>(
+    simd: S,
+    bands: &[&Band],
+    boxes: &BoxesOnScreen,
+    lane: usize,
+    moving: bool,
+) -> Verdict {
+    if moving && boxes.uncut >> lane & 1 == 0 {
+        return Verdict::Visible;
+    }
+    let rect = [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]];
+    for band in bands {
+        if !band.hides(simd, rect, boxes.depth[lane]) {
+            return Verdict::Visible;
+        }
+    }
+    Verdict::Hidden
+}
+
+impl SixteenBoxes {
+    fn widened(&self, by: f32) -> SixteenBoxes {
+        SixteenBoxes {
+            min: self.min.map(|axis| axis.map(|v| (v - by).next_down())),
+            max: self.max.map(|axis| axis.map(|v| (v + by).next_up())),
+        }
+    }
+}

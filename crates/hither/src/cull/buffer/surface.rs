@@ -1,0 +1,370 @@
+//! What is kept of an image: for each pixel the farthest depth of what covers all of it, in tiles of 16×16.
+//!
+//! A tile is empty, or one plane of depth (a face covers all of it), or 256 depths. Depths only ever rise.
+//! Sixteen tiles make a cell of 64×64 pixels; a tile's minimum is exact whenever no tile is stale, a cell's
+//! minimum is the least of its tiles'. Pixels beyond the image hold +∞ and never hold a minimum down.
+
+use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
+
+/// Depth as a function of a tile's columns and rows, 0 to 15.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct TilePlane {
+    pub origin: f32,
+    pub per_column: f32,
+    pub per_row: f32,
+}
+
+impl TilePlane {
+    const ZERO: TilePlane = TilePlane { origin: 0.0, per_column: 0.0, per_row: 0.0 };
+
+    #[inline(always)]
+    pub fn at(&self, column: i32, row: i32) -> f32 {
+        (self.origin + row as f32 * self.per_row) + column as f32 * self.per_column
+    }
+
+    #[inline(always)]
+    pub fn row<S: Simd>(&self, simd: S, row: i32) -> f32x16<S> {
+        f32x16::from_slice(simd, &COLUMNS) * self.per_column + (self.origin + row as f32 * self.per_row)
+    }
+
+    /// Smallest value over a rectangle of columns and rows (inclusive): floating-point sums are monotonic.
+    #[inline(always)]
+    pub fn min(&self, x0: i32, y0: i32, x1: i32, y1: i32) -> f32 {
+        self.at(if self.per_column < 0.0 { x1 } else { x0 }, if self.per_row < 0.0 { y1 } else { y0 })
+    }
+
+    #[inline(always)]
+    fn max(&self) -> f32 {
+        self.at(if self.per_column < 0.0 { 0 } else { 15 }, if self.per_row < 0.0 { 0 } else { 15 })
+    }
+
+    /// Whether it is nowhere below `other`, roundings included: the difference of planes is least in a corner.
+    #[inline(always)]
+    fn above(&self, other: &TilePlane) -> bool {
+        let roundings = (self.size() + other.size()) * 1e-6;
+        [(0, 0), (15, 0), (0, 15), (15, 15)]
+            .into_iter()
+            .all(|(x, y)| self.at(x, y) >= other.at(x, y) + roundings)
+    }
+
+    /// No term or sum is larger.
+    #[inline(always)]
+    fn size(&self) -> f32 {
+        self.origin.abs() + 15.0 * (self.per_column.abs() + self.per_row.abs())
+    }
+}
+
+pub(super) const COLUMNS: [f32; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
+
+/// One row of a tile: a cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Row(pub [f32; 16]);
+
+/// How a tile is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Empty,
+    Plane,
+    Pixels,
+}
+
+/// The depths of an image.
+#[derive(Clone, Debug)]
+pub(super) struct Surface {
+    pub width: i32,
+    pub height: i32,
+    /// First image row: a band of an image is a surface of its own. A multiple of 64.
+    pub top: i32,
+    cells_x: usize,
+    cells_y: usize,
+    kind: Vec<Kind>,
+    plane: Vec<TilePlane>,
+    rows: Vec<Row>,
+    /// By cell, sixteen tiles each: smallest depth, and a bound on the largest.
+    min: Vec<Row>,
+    max: Vec<f32>,
+    cell_min: Vec<f32>,
+    is_stale: Vec<bool>,
+    stale: Vec<u32>,
+}
+
+impl Surface {
+    pub fn new(width: u32, top: u32, height: u32) -> Surface {
+        assert!(top.is_multiple_of(64) && width > 0 && height > 0);
+        let (cells_x, cells_y) = (width.div_ceil(64) as usize, height.div_ceil(64) as usize);
+        let tiles = cells_x * cells_y * 16;
+        let mut surface = Surface {
+            width: width as i32,
+            height: height as i32,
+            top: top as i32,
+            cells_x,
+            cells_y,
+            kind: vec![Kind::Empty; tiles],
+            plane: vec![TilePlane::ZERO; tiles],
+            rows: vec![Row([0.0; 16]); tiles * 16],
+            min: vec![Row([0.0; 16]); cells_x * cells_y],
+            max: vec![0.0; tiles],
+            cell_min: vec![0.0; cells_x * cells_y],
+            is_stale: vec![false; tiles],
+            stale: Vec::new(),
+        };
+        surface.clear();
+        surface
+    }
+
+    /// Makes everything empty. Cost: the tiles, not the pixels.
+    pub fn clear(&mut self) {
+        self.kind.fill(Kind::Empty);
+        self.max.fill(0.0);
+        self.cell_min.fill(0.0);
+        self.is_stale.fill(false);
+        self.stale.clear();
+        self.min.fill(Row([0.0; 16]));
+        let (tiles_x, tiles_y) =
+            (self.width.cast_unsigned().div_ceil(16), self.height.cast_unsigned().div_ceil(16));
+        for cell in 0..self.min.len() {
+            let (x, y) = ((cell % self.cells_x * 4) as u32, (cell / self.cells_x * 4) as u32);
+            if x + 4 > tiles_x || y + 4 > tiles_y {
+                for c in 0..16u32 {
+                    if x + c % 4 >= tiles_x || y + c / 4 >= tiles_y {
+                        self.min[cell].0[c as usize] = f32::INFINITY;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Tiles in a row of them, those of incomplete cells too.
+    pub fn tiles_x(&self) -> i32 {
+        self.cells_x as i32 * 4
+    }
+
+    pub fn tiles_y(&self) -> i32 {
+        self.cells_y as i32 * 4
+    }
+
+    #[inline(always)]
+    pub fn tile(&self, x: i32, y: i32) -> usize {
+        let cell = (y >> 2) as usize * self.cells_x + (x >> 2) as usize;
+        cell * 16 + ((y & 3) * 4 + (x & 3)) as usize
+    }
+
+    /// First column and row of a tile, pixels of the surface.
+    #[inline(always)]
+    pub fn corner(&self, tile: usize) -> (i32, i32) {
+        let (cell, c) = (tile / 16, tile as i32 % 16);
+        let (x, y) = ((cell % self.cells_x) as i32, (cell / self.cells_x) as i32);
+        (x * 64 + c % 4 * 16, y * 64 + c / 4 * 16)
+    }
+
+    #[inline(always)]
+    pub fn tile_min(&self, tile: usize) -> f32 {
+        self.min[tile / 16].0[tile % 16]
+    }
+
+    #[inline(always)]
+    pub fn cell_min(&self, x: i32, y: i32) -> f32 {
+        self.cell_min[y as usize * self.cells_x + x as usize]
+    }
+
+    /// A plane covers all of a tile.
+    #[inline(always)]
+    pub fn cover<S: Simd>(&mut self, simd: S, tile: usize, plane: TilePlane) {
+        let (low, high) = (plane.min(0, 0, 15, 15), plane.max());
+        if self.tile_min(tile) >= high {
+            return;
+        }
+        let replace = match self.kind[tile] {
+            Kind::Empty => true,
+            _ if self.max[tile] <= low => true,
+            Kind::Plane if plane.above(&self.plane[tile]) => true,
+            Kind::Plane if self.plane[tile].above(&plane) => return,
+            _ => false,
+        };
+        if replace {
+            self.kind[tile] = Kind::Plane;
+            self.plane[tile] = plane;
+            self.max[tile] = high;
+            self.set_min(simd, tile, low);
+            return;
+        }
+        self.open(simd, tile);
+        for row in 0..16 {
+            let at = &mut self.rows[tile * 16 + row].0;
+            f32x16::from_slice(simd, at).max(plane.row(simd, row as i32)).store_slice(at);
+        }
+        self.max[tile] = self.max[tile].max(high);
+        self.mark_stale(tile);
+    }
+
+    /// Makes a tile 256 depths, if it is not.
+    #[inline(always)]
+    pub fn open<S: Simd>(&mut self, simd: S, tile: usize) {
+        if self.kind[tile] != Kind::Pixels {
+            self.spell_out(simd, tile);
+        }
+    }
+
+    #[inline(never)]
+    fn spell_out<S: Simd>(&mut self, simd: S, tile: usize) {
+        let plane = if self.kind[tile] == Kind::Plane { self.plane[tile] } else { TilePlane::ZERO };
+        let (x, y) = self.corner(tile);
+        self.kind[tile] = Kind::Pixels;
+        for row in 0..16i32 {
+            let at = &mut self.rows[tile * 16 + row as usize].0;
+            if y + row >= self.height {
+                *at = [f32::INFINITY; 16];
+                continue;
+            }
+            plane.row(simd, row).store_slice(at);
+            if x + 16 > self.width {
+                at[(self.width - x).max(0) as usize..].fill(f32::INFINITY);
+            }
+        }
+    }
+
+    /// Raises the pixels of `mask` in a row of an open tile.
+    #[inline(always)]
+    pub fn raise<S: Simd>(&mut self, simd: S, tile: usize, row: i32, depth: f32x16<S>, mask: mask32x16<S>) {
+        let at = &mut self.rows[tile * 16 + row as usize].0;
+        let old = f32x16::from_slice(simd, at);
+        mask.select(old.max(depth), old).store_slice(at);
+    }
+
+    /// Says that pixels of an open tile were raised, none above `highest`.
+    #[inline(always)]
+    pub fn raised(&mut self, tile: usize, highest: f32) {
+        self.max[tile] = self.max[tile].max(highest);
+        self.mark_stale(tile);
+    }
+
+    #[inline(always)]
+    fn mark_stale(&mut self, tile: usize) {
+        if !self.is_stale[tile] {
+            self.is_stale[tile] = true;
+            self.stale.push(tile as u32);
+        }
+    }
+
+    /// Brings the minima of what was raised up to date.
+    #[inline(always)]
+    pub fn refresh<S: Simd>(&mut self, simd: S) {
+        while let Some(tile) = self.stale.pop() {
+            let tile = tile as usize;
+            self.is_stale[tile] = false;
+            if self.kind[tile] != Kind::Pixels {
+                continue;
+            }
+            let rows = &self.rows[tile * 16..tile * 16 + 16];
+            let mut least = f32x16::from_slice(simd, &rows[0].0);
+            for row in &rows[1..] {
+                least = least.min(f32x16::from_slice(simd, &row.0));
+            }
+            self.set_min(simd, tile, least.reduce_min());
+        }
+    }
+
+    #[inline(always)]
+    fn set_min<S: Simd>(&mut self, simd: S, tile: usize, min: f32) {
+        let cell = &mut self.min[tile / 16].0;
+        if cell[tile % 16] != min {
+            cell[tile % 16] = min;
+            self.cell_min[tile / 16] = f32x16::from_slice(simd, cell).reduce_min();
+        }
+    }
+
+    /// Whether every pixel of `[left, top, right, bottom]` (inclusive, inside the surface) holds more than
+    /// `depth`. Exact.
+    #[inline(always)]
+    pub fn all_nearer<S: Simd>(&self, simd: S, rect: [i32; 4], depth: f32) -> bool {
+        let [left, top, right, bottom] = rect;
+        if (right >> 4) - (left >> 4) <= 1 && (bottom >> 4) - (top >> 4) <= 1 {
+            return self.tiles_are_nearer(simd, rect, depth);
+        }
+        for y in top >> 6..=bottom >> 6 {
+            for x in left >> 6..=right >> 6 {
+                if self.cell_min(x, y) > depth {
+                    continue;
+                }
+                let inner =
+                    [left.max(x * 64), top.max(y * 64), right.min(x * 64 + 63), bottom.min(y * 64 + 63)];
+                if !self.tiles_are_nearer(simd, inner, depth) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn tiles_are_nearer<S: Simd>(&self, simd: S, rect: [i32; 4], depth: f32) -> bool {
+        let [left, top, right, bottom] = rect;
+        for y in top >> 4..=bottom >> 4 {
+            for x in left >> 4..=right >> 4 {
+                let tile = self.tile(x, y);
+                if self.tile_min(tile) > depth {
+                    continue;
+                }
+                let (x, y) = (x * 16, y * 16);
+                let (x0, y0, x1, y1) =
+                    ((left - x).max(0), (top - y).max(0), (right - x).min(15), (bottom - y).min(15));
+                let nearer = match self.kind[tile] {
+                    Kind::Empty => false,
+                    Kind::Plane => self.plane[tile].min(x0, y0, x1, y1) > depth,
+                    Kind::Pixels => self.rows_are_nearer(simd, tile, [x0, y0, x1, y1], depth),
+                };
+                if !nearer {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn rows_are_nearer<S: Simd>(&self, simd: S, tile: usize, rect: [i32; 4], depth: f32) -> bool {
+        let [x0, y0, x1, y1] = rect;
+        let columns = (0xFFFF << x0) & (0xFFFF >> (15 - x1));
+        let threshold = f32x16::splat(simd, depth);
+        let rows = &self.rows[tile * 16 + y0 as usize..=tile * 16 + y1 as usize];
+        // Asked this way round, a depth that is no number is nearer than nothing.
+        rows.iter().all(|row| {
+            let nearer = f32x16::from_slice(simd, &row.0).simd_gt(threshold).to_bitmask() as i32;
+            nearer & columns == columns
+        })
+    }
+
+    /// Depth at a pixel of the surface.
+    pub fn depth(&self, x: u32, y: u32) -> f32 {
+        assert!((x as i32) < self.width && (y as i32) < self.height, "({x}, {y}) is outside the image");
+        let tile = self.tile(x as i32 >> 4, y as i32 >> 4);
+        let (column, row) = (x & 15, y & 15);
+        match self.kind[tile] {
+            Kind::Empty => 0.0,
+            Kind::Plane => self.plane[tile].at(column as i32, row as i32).max(0.0),
+            Kind::Pixels => self.rows[tile * 16 + row as usize].0[column as usize].max(0.0),
+        }
+    }
+
+    /// Each pixel gets the nearer of the two surfaces' depths. Both are of the same size.
+    #[inline(always)]
+    pub fn merge<S: Simd>(&mut self, simd: S, other: &Surface) {
+        for tile in 0..self.kind.len() {
+            match other.kind[tile] {
+                Kind::Empty => {}
+                Kind::Plane => self.cover(simd, tile, other.plane[tile]),
+                Kind::Pixels => {
+                    self.open(simd, tile);
+                    for row in 0..16 {
+                        let theirs = f32x16::from_slice(simd, &other.rows[tile * 16 + row].0);
+                        let at = &mut self.rows[tile * 16 + row].0;
+                        f32x16::from_slice(simd, at).max(theirs).store_slice(at);
+                    }
+                    self.raised(tile, other.max[tile]);
+                }
+            }
+        }
+        self.refresh(simd);
+    }
+}

@@ -1,0 +1,23 @@
+//! What is hidden: verdicts on objects, boxes and nodes.
+//!
+//! [`OcclusionBuffer`] is the small interface that an engine wants: draw occluders, ask about boxes, balls,
+//! rectangles and meshes, in any order. What it calls hidden is hidden in the continuous image, whatever the
+//! buffer's resolution.
+
+mod buffer;
+
+pub use buffer::{
+    Boxes, CannotMerge, Drawn, Occluder, OccluderError, OcclusionBuffer, OcclusionOptions, ScreenRect,
+    SharedBuffer, Sides,
+};
+
+/// What is known about something that was asked about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Verdict {
+    /// It may be seen. The error of a conservative test is on this side.
+    Visible,
+    /// No point of it can be seen: occluders are before all of it that the view could show.
+    Hidden,
+    /// No point of it lies in the view.
+    Outside,
+}
