@@ -2,6 +2,7 @@
 
 mod box_tests;
 mod coherence;
+mod cull;
 mod exact;
 mod greene;
 mod growth;
@@ -49,6 +50,7 @@ pub static TABLES: &[TableInfo] = &[
     box_tests::INFO,
     trees::INFO,
     load::INFO,
+    cull::INFO,
 ];
 
 const fn column(key: &'static str, title: &'static str, digits: usize) -> Column {

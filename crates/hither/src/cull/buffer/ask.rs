@@ -76,31 +76,22 @@ pub(crate) fn project<S: Simd>(
     min: &[[f32; 16]; 3],
     max: &[[f32; 16]; 3],
 ) -> BoxesOnScreen {
-    let splat = |v: f32| f32x16::splat(simd, v);
-    let (lo, hi) = (
-        min.each_ref().map(|a| f32x16::from_slice(simd, a)),
-        max.each_ref().map(|a| f32x16::from_slice(simd, a)),
-    );
-    let reach: [f32x16<S>; 3] =
-        [lo[0].abs().max(hi[0].abs()), lo[1].abs().max(hi[1].abs()), lo[2].abs().max(hi[2].abs())];
-    let error = |r: &[f32; 4]| {
-        let size = reach[0] * r[0].abs() + reach[1] * r[1].abs() + reach[2] * r[2].abs() + r[3].abs();
-        size * ROUNDING
-    };
-    let (x_error, y_error) = (error(&view.x), error(&view.y));
+    let (lo, hi) = (axes(simd, min), axes(simd, max));
+    let reach = reach(&lo, &hi);
+    let (x_error, y_error) = (error(&reach, &view.x), error(&reach, &view.y));
     let (x, y) = (corners(simd, &view.x, &lo, &hi), corners(simd, &view.y, &lo, &hi));
-    let (mut low, mut high) = ([splat(0.0); 2], [splat(0.0); 2]);
+    let (mut low, mut high) = ([f32x16::splat(simd, 0.0); 2], [f32x16::splat(simd, 0.0); 2]);
     let (least_w, w_error, depth, clear, mut inside);
     if view.perspective {
         let w = corners(simd, &view.w, &lo, &hi);
-        w_error = error(&view.w);
+        w_error = error(&reach, &view.w);
         least_w = smallest(&w) - w_error;
-        let near = splat(view.d[3] * 1.000_001);
+        let near = f32x16::splat(simd, view.d[3] * 1.000_001);
         clear = least_w.simd_gt(near) & least_w.simd_gt(w_error * 8.0);
-        inside = (largest(&w) + w_error).simd_ge(splat(view.d[3] * 0.999_999));
+        inside = (largest(&w) + w_error).simd_ge(f32x16::splat(simd, view.d[3] * 0.999_999));
         depth = near / least_w * 1.000_001;
         for c in 0..8 {
-            let reciprocal = splat(1.0) / w[c];
+            let reciprocal = f32x16::splat(simd, 1.0) / w[c];
             let (qx, qy) = (x[c] * reciprocal, y[c] * reciprocal);
             if c == 0 {
                 (low, high) = ([qx, qy], [qx, qy]);
@@ -111,28 +102,32 @@ pub(crate) fn project<S: Simd>(
         }
     } else {
         let d = corners(simd, &view.d, &lo, &hi);
-        let d_error = error(&view.d);
-        (least_w, w_error) = (splat(1.0), splat(0.0));
+        let d_error = error(&reach, &view.d);
+        (least_w, w_error) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
         depth = largest(&d) + d_error;
-        clear = depth.simd_le(splat(1.0));
-        inside = (smallest(&d) - d_error).simd_le(splat(1.0)) & depth.simd_gt(splat(0.0));
+        clear = depth.simd_le(f32x16::splat(simd, 1.0));
+        inside = (smallest(&d) - d_error).simd_le(f32x16::splat(simd, 1.0)) & depth.simd_gt(f32x16::splat(simd, 0.0));
         low = [smallest(&x), smallest(&y)];
         high = [largest(&x), largest(&y)];
     }
-    let mut rect = [splat(0.0); 4];
-    let (mut within, mut uncut) = (clear, clear);
+    let mut rect = [f32x16::splat(simd, 0.0); 4];
+    let (mut within, mut uncut, mut certain) = (clear, clear, clear);
     for (k, (size, error)) in [(view.width, x_error), (view.height, y_error)].into_iter().enumerate() {
         let farthest = low[k].abs().max(high[k].abs());
         let margin = (farthest * w_error + error) / least_w + farthest * (1.0 / (1 << 21) as f32);
         // A square touched in its border alone counts.
         let from = low[k] - margin - 1e-6;
         let to = high[k] + margin + 1e-6;
-        within &= from.simd_gt(splat(-8000.0)) & to.simd_lt(splat(24000.0));
-        uncut &= from.simd_gt(splat(view.ring)) & to.simd_lt(splat(size - view.ring));
-        let seen = from.simd_le(splat(size + view.ring)) & to.simd_ge(splat(-view.ring));
-        inside &= seen | !clear;
-        rect[k] = from.floor().max(splat(0.0)).min(splat(size - 1.0));
-        rect[k + 2] = to.floor().min(splat(size - 1.0)).max(splat(0.0));
+        within &= from.simd_gt(f32x16::splat(simd, -8000.0)) & to.simd_lt(f32x16::splat(simd, 24000.0));
+        uncut &= from.simd_gt(f32x16::splat(simd, view.ring)) & to.simd_lt(f32x16::splat(simd, size - view.ring));
+        // Asked this way round, what is no number is seen.
+        let unseen = from.simd_gt(f32x16::splat(simd, size + view.ring))
+            | to.simd_lt(f32x16::splat(simd, -view.ring));
+        inside &= !(unseen & clear);
+        let far = f32x16::splat(simd, 1e30);
+        certain &= from.abs().simd_lt(far) & to.abs().simd_lt(far);
+        rect[k] = from.floor().max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, size - 1.0));
+        rect[k + 2] = to.floor().min(f32x16::splat(simd, size - 1.0)).max(f32x16::splat(simd, 0.0));
     }
     let mut inside_bits = inside.to_bitmask() as u16;
     let clear_bits = clear.to_bitmask() as u16;
@@ -141,18 +136,39 @@ pub(crate) fn project<S: Simd>(
         inside_bits &= !(crossing & beyond_a_side(simd, view, &x, &y, &lo, &hi, [x_error, y_error]));
     }
     let ordered = if view.in_range { ordered(&lo, &hi).to_bitmask() as u16 } else { 0 };
-    let infinite = splat(f32::INFINITY);
+    let infinite = f32x16::splat(simd, f32::INFINITY);
     BoxesOnScreen {
         left: whole(rect[0]),
         top: whole(rect[1]),
         right: whole(rect[2]),
         bottom: whole(rect[3]),
-        depth: (clear & mask32x16::from_bitmask(simd, u64::from(ordered))).select(depth, infinite).into(),
+        depth: (certain & mask32x16::from_bitmask(simd, u64::from(ordered))).select(depth, infinite).into(),
         // What is no box may be anywhere.
         inside: inside_bits | !ordered,
         clear: within.to_bitmask() as u16 & ordered,
         uncut: uncut.to_bitmask() as u16 & ordered,
     }
+}
+
+#[inline(always)]
+fn axes<S: Simd>(simd: S, sides: &[[f32; 16]; 3]) -> [f32x16<S>; 3] {
+    [
+        f32x16::from_slice(simd, &sides[0]),
+        f32x16::from_slice(simd, &sides[1]),
+        f32x16::from_slice(simd, &sides[2]),
+    ]
+}
+
+/// Largest magnitudes of the coordinates.
+#[inline(always)]
+fn reach<S: Simd>(lo: &[f32x16<S>; 3], hi: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    [lo[0].abs().max(hi[0].abs()), lo[1].abs().max(hi[1].abs()), lo[2].abs().max(hi[2].abs())]
+}
+
+/// What a row's products with the corners may be off by.
+#[inline(always)]
+fn error<S: Simd>(reach: &[f32x16<S>; 3], r: &[f32; 4]) -> f32x16<S> {
+    (reach[0] * r[0].abs() + reach[1] * r[1].abs() + reach[2] * r[2].abs() + r[3].abs()) * ROUNDING
 }
 
 /// Coordinates beyond this, metres, could overflow on their way; such a box is seen everywhere.
@@ -178,22 +194,18 @@ fn beyond_a_side<S: Simd>(
     y: &[f32x16<S>; 8],
     lo: &[f32x16<S>; 3],
     hi: &[f32x16<S>; 3],
-    error: [f32x16<S>; 2],
+    errors: [f32x16<S>; 2],
 ) -> u16 {
     if view.ring > 0.0 {
         return 0;
     }
     let one = f32x16::splat(simd, 1.0);
     let w = if view.perspective { corners(simd, &view.w, lo, hi) } else { [one; 8] };
-    let reach = [0, 1, 2].map(|k| lo[k].abs().max(hi[k].abs()));
-    let w_size = reach[0] * view.w[0].abs()
-        + reach[1] * view.w[1].abs()
-        + reach[2] * view.w[2].abs()
-        + view.w[3].abs();
+    let w_error = error(&reach(lo, hi), &view.w);
     let mut beyond = 0u16;
-    for (p, error, size) in [(x, error[0], view.width), (y, error[1], view.height)] {
+    for (p, own, size) in [(x, errors[0], view.width), (y, errors[1], view.height)] {
         for (bound, sign) in [(-0.01f32, 1.0f32), (size + 0.01, -1.0)] {
-            let slack = error + w_size * (bound.abs() * ROUNDING);
+            let slack = own + w_error * bound.abs();
             let mut most = f32x16::splat(simd, f32::NEG_INFINITY);
             for c in 0..8 {
                 most = most.max((p[c] - w[c] * bound) * sign);

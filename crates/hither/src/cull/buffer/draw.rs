@@ -64,7 +64,10 @@ impl Band {
     /// Whether an image's rectangle (inclusive) is hidden at `depth`, as far as this band knows.
     #[inline(always)]
     pub fn hides<S: Simd>(&self, simd: S, rect: [i32; 4], depth: f32) -> bool {
-        self.rows_of(rect).is_none_or(|rect| self.surface.all_nearer(simd, rect, depth))
+        match self.rows_of(rect) {
+            Some(rect) => self.surface.all_nearer(simd, rect, depth),
+            None => true,
+        }
     }
 
     /// Draws the patches that may show, nearest first.
@@ -77,7 +80,14 @@ impl Band {
         self.open.clear();
         self.visit(simd, standing, 0);
         while let Some(open) = self.open.pop() {
-            if self.hides(simd, open.rect, open.depth) {
+            let hidden = match self.rows_of(open.rect) {
+                Some(rect) => simd.vectorize(
+                    #[inline(always)]
+                    || self.surface.all_nearer_now(simd, rect, open.depth),
+                ),
+                None => true,
+            };
+            if hidden {
                 drawn.hidden += 1;
                 continue;
             }
@@ -92,6 +102,10 @@ impl Band {
                 }
             }
         }
+        simd.vectorize(
+            #[inline(always)]
+            || self.surface.refresh(simd),
+        );
     }
 
     /// Opens the children of a node that the image may show, the nearest last.
@@ -173,7 +187,7 @@ impl Band {
                 continue;
             }
             let outline = Outline {
-                corner: face.corner.map(|v| self.placed.corner(v as usize)),
+                corner: self.placed.corners(&face.corner),
                 corners: usize::from(face.corners),
                 turn: i32::from(self.turns[f]),
                 ends,
@@ -185,7 +199,6 @@ impl Band {
         } else {
             self.joint.finish(simd, &mut self.surface, self.placed.nearest);
         }
-        self.surface.refresh(simd);
     }
 
     /// Pixels that the patch's outline may move by under the margin; `None` if it is too near to say.
@@ -211,22 +224,28 @@ impl Band {
         faces: &[Face],
     ) {
         placing.place(simd, &standing.occluder.vertices, patch, &mut self.placed);
-        let nearest = self.placed.depth.iter().fold(0.0f32, |n, &d| n.max(d));
-        // The bounds of depths themselves are rounded down.
-        self.placed.nearest = nearest;
         let front = standing.at.front_sign as i32;
         self.turns.clear();
         for face in faces {
-            let c = face.corner.map(|v| self.placed.corner(v as usize));
+            let c = self.placed.corners(&face.corner);
             let sign = if face.corners == 3 {
                 Some(doubled_area(&c[0], &c[1], &c[2]).signum() as i32)
             } else {
-                let t = [0, 1, 2, 3].map(|k| doubled_area(&c[k], &c[(k + 1) % 4], &c[(k + 2) % 4]));
+                let t = [
+                    doubled_area(&c[0], &c[1], &c[2]),
+                    doubled_area(&c[1], &c[2], &c[3]),
+                    doubled_area(&c[2], &c[3], &c[0]),
+                    doubled_area(&c[3], &c[0], &c[1]),
+                ];
                 let (low, high) = (t[0].min(t[1]).min(t[2].min(t[3])), t[0].max(t[1]).max(t[2].max(t[3])));
                 // Turns that differ: seen so nearly edge-on that it is no convex outline.
                 (low >= 0 || high <= 0).then_some(high.signum() as i32 + low.signum() as i32)
             };
-            self.turns.push(turn_of(sign.map(i32::signum), front, face.two_sided));
+            let turn = match sign {
+                Some(s) => turn_of(s.signum(), front, face.two_sided),
+                None => 0,
+            };
+            self.turns.push(turn);
         }
     }
 
@@ -254,7 +273,7 @@ impl Band {
             let mut signs = pieces.iter().flatten().map(|p| p.sign);
             let first = signs.next();
             let sign = first.filter(|&s| s != 0 && signs.all(|other| other == s));
-            let turn = turn_of(Some(sign.unwrap_or(0)), front, face.two_sided);
+            let turn = turn_of(sign.unwrap_or(0), front, face.two_sided);
             // Where the pieces disagree, and where nothing is left, nothing is drawn.
             self.turns.push(if sign.is_some() { turn } else { 0 });
             if sign.is_some() && turn != 0 {
@@ -268,15 +287,14 @@ impl Band {
     }
 }
 
-/// +1 or −1 for a face that is drawn, else 0. `sign` is that of its area on the screen, `None` if it has none.
+/// +1 or −1 for a face that is drawn, else 0. `sign` is that of its area on the screen.
 #[inline(always)]
-fn turn_of(sign: Option<i32>, front: i32, two_sided: bool) -> i8 {
+fn turn_of(sign: i32, front: i32, two_sided: bool) -> i8 {
     match sign {
-        None => 0,
         // Edge-on: it covers nothing, but joins its neighbours.
-        Some(0) => front as i8,
-        Some(s) if s == front || two_sided => s as i8,
-        Some(_) => 0,
+        0 => front as i8,
+        s if s == front || two_sided => s as i8,
+        _ => 0,
     }
 }
 

@@ -164,124 +164,94 @@ fn erode(values: &mut Vec<f32>, width: usize, radius: usize) {
     values.extend((0..count).map(|i| wide[i].min(wide[i + shift])));
 }
 
-/// An edge over the surface's pixels.
+/// What an edge of a face is near pixels, e being as above.
 #[derive(Clone, Copy, Debug, Default)]
 struct Edge {
     a: i32,
     b: i32,
-    /// e at pixel (0, 0).
+    /// e at pixel (0, 0) of the surface.
     c: i64,
     /// All of a pixel is inside if e is at least this …
     inside: i32,
     /// … and some of it may be if e is at least minus this.
     touch: i32,
-    /// The edge may touch a pixel if e is at most this (and at least −`touch`).
-    reach: i32,
-    /// The true edge may pass a pixel's centre if e is at least minus this.
-    sway: i32,
+    /// Whether the surface ends here.
     ends: bool,
-    /// Pixels that the edge itself may touch.
-    left: i32,
-    top: i32,
-    right: i32,
-    bottom: i32,
+}
+
+/// Where an edge at which the surface ends takes a layer off.
+#[derive(Clone, Copy, Debug, Default)]
+struct End {
+    /// The true edge may pass before a pixel's centre if e is at least this …
+    least: i32,
+    /// … and touch the pixel if e is at most this …
+    most: i32,
+    /// … and these are the pixels around it: left, top, right, bottom.
+    around: [i32; 4],
 }
 
 /// A face being filled.
-struct Face {
-    edge: [Edge; 4],
-    edges: usize,
-    /// Pixels that the face may touch, surface coordinates, not clipped.
-    left: i32,
-    top: i32,
-    right: i32,
-    bottom: i32,
+#[derive(Clone, Copy)]
+struct Face<'a> {
+    outline: &'a Outline,
+    slack: i32,
+    /// First image row of the surface. Planes count from the image's, so that bands hold the same bits.
+    band: i32,
+    /// Pixels of the surface that the face may touch: left, top, right, bottom, not clipped.
+    around: [i32; 4],
     /// Depth is nowhere in pixel (x, y) of the image and the face less than
     /// `plane[0]·x + plane[1]·y + plane[2]`, nor than `farthest`.
     plane: [f64; 3],
     farthest: f32,
     nearest: f32,
-    /// First image row of the surface. The plane counts from the image's, so that bands hold the same bits.
-    band: i32,
 }
 
-impl Face {
+impl<'a> Face<'a> {
     #[inline(always)]
-    fn new(outline: &Outline, slack: i32, top: i32) -> Face {
-        let n = outline.corners;
+    fn new(outline: &'a Outline, slack: i32, band: i32) -> Face<'a> {
         let c = &outline.corner;
-        let mut face = Face {
-            edge: [Edge::default(); 4],
-            edges: n,
-            left: i32::MAX,
-            top: i32::MAX,
-            right: i32::MIN,
-            bottom: i32::MIN,
-            plane: [0.0; 3],
-            farthest: f32::INFINITY,
-            nearest: f32::NEG_INFINITY,
-            band: top,
-        };
-        for corner in &c[..n] {
-            face.left = face.left.min(corner.x);
-            face.top = face.top.min(corner.y);
-            face.right = face.right.max(corner.x);
-            face.bottom = face.bottom.max(corner.y);
-            face.farthest = face.farthest.min(corner.depth);
-            face.nearest = face.nearest.max(corner.depth);
+        let (mut left, mut top, mut right, mut bottom) = (c[0].x, c[0].y, c[0].x, c[0].y);
+        let (mut farthest, mut nearest) = (c[0].depth, c[0].depth);
+        // The fourth corner of a triangle is one of the others.
+        for corner in &c[1..] {
+            (left, right) = (left.min(corner.x), right.max(corner.x));
+            (top, bottom) = (top.min(corner.y), bottom.max(corner.y));
+            (farthest, nearest) = (farthest.min(corner.depth), nearest.max(corner.depth));
         }
-        (face.left, face.right) = (first_pixel(face.left, slack), last_pixel(face.right, slack));
-        (face.top, face.bottom) = (first_pixel(face.top, slack) - top, last_pixel(face.bottom, slack) - top);
-        face
-    }
-
-    #[inline(always)]
-    fn set_edges(&mut self, outline: &Outline, slack: i32, top: i32) {
-        for k in 0..self.edges {
-            let (p, q) = (&outline.corner[k], &outline.corner[(k + 1) % self.edges]);
-            self.edge[k] = edge(p, q, outline.turn, slack, top, outline.ends >> k & 1 == 1);
-        }
+        let around = [
+            first_pixel(left, slack),
+            first_pixel(top, slack) - band,
+            last_pixel(right, slack),
+            last_pixel(bottom, slack) - band,
+        ];
+        Face { outline, slack, band, around, plane: [0.0; 3], farthest, nearest }
     }
 
     /// A plane through three corners, lowered until no corner lies below it, then by what it falls within a
     /// pixel: where the face is, any plane is at most the largest of its excesses at the corners too high.
     #[inline(always)]
-    fn set_plane(&mut self, outline: &Outline, slack: i32) {
-        let c = &outline.corner;
+    fn set_plane(&mut self) {
+        let c = &self.outline.corner;
+        let (r1, r2, r3) = (from_first(c, 1), from_first(c, 2), from_first(c, 3));
         // The larger of the two triangles along the diagonal from corner 0.
-        let doubled = |i: usize, j: usize| {
-            (f64::from(c[i].x) - f64::from(c[0].x)) * (f64::from(c[j].y) - f64::from(c[0].y))
-                - (f64::from(c[j].x) - f64::from(c[0].x)) * (f64::from(c[i].y) - f64::from(c[0].y))
-        };
-        let (mut i, mut j, mut area) = (1, 2, doubled(1, 2));
-        if self.edges == 4 {
-            let other = doubled(2, 3);
-            if other.abs() > area.abs() {
-                (i, j, area) = (2, 3, other);
-            }
-        }
-        let sub = 1.0 / 256.0;
-        let rel = |k: usize| {
-            let (x, y) = (f64::from(c[k].x) - f64::from(c[0].x), f64::from(c[k].y) - f64::from(c[0].y));
-            (x * sub, y * sub, f64::from(c[k].depth) - f64::from(c[0].depth))
-        };
-        let ((x1, y1, d1), (x2, y2, d2)) = (rel(i), rel(j));
-        let per = 65536.0 / area;
+        let (area, other) = (r1.0 * r2.1 - r2.0 * r1.1, r2.0 * r3.1 - r3.0 * r2.1);
+        let ((x1, y1, d1), (x2, y2, d2), area) =
+            if other.abs() > area.abs() { (r2, r3, other) } else { (r1, r2, area) };
+        let per = 1.0 / area;
         let (mut a, mut b) = ((d1 * y2 - d2 * y1) * per, (d2 * x1 - d1 * x2) * per);
         if !(a.abs() < 1e6 && b.abs() < 1e6) {
             (a, b) = (0.0, 0.0);
         }
-        let mut excess = 0.0f64;
-        for k in 1..self.edges {
-            let (x, y, d) = rel(k);
-            excess = excess.max(a * x + b * y - d);
+        let mut excess = (a * r1.0 + b * r1.1 - r1.2).max(a * r2.0 + b * r2.1 - r2.2).max(0.0);
+        if self.outline.corners == 4 {
+            excess = excess.max(a * r3.0 + b * r3.1 - r3.2);
         }
-        let fall = (a.abs() + b.abs()) * (0.5 + f64::from(slack) * sub)
-            + f64::from(self.nearest.abs().max(self.farthest.abs())) * 1e-12;
+        let sub = 1.0 / 256.0;
+        let size = self.nearest.abs().max(self.farthest.abs());
+        let fall = (a.abs() + b.abs()) * (0.5 + f64::from(self.slack) * sub) + f64::from(size) * 1e-12;
         // From corner 0 to the centre of pixel (0, 0).
         let (x0, y0) = (f64::from(c[0].x) * sub - 0.5, f64::from(c[0].y) * sub - 0.5);
-        let at_zero = f64::from(c[0].depth) - a * x0 - b * y0;
-        self.plane = [a, b, at_zero - excess - fall];
+        self.plane = [a, b, f64::from(c[0].depth) - a * x0 - b * y0 - excess - fall];
     }
 
     /// The plane over a tile, lowered by more than the roundings of its use.
@@ -295,6 +265,53 @@ impl Face {
         let origin = (origin - size * (1.0 / f64::from(1 << 20))) as f32;
         TilePlane { origin, per_column: a as f32, per_row: b as f32 }
     }
+
+    #[inline(always)]
+    fn edge(&self, k: usize) -> Edge {
+        let (p, q) = self.ends_of_edge(k);
+        let turn = self.outline.turn;
+        let (dx, dy) = ((q.x - p.x) * turn, (q.y - p.y) * turn);
+        let (a, b) = (-dy, dx);
+        // Of an edge and its reverse exactly one owns a point on it.
+        let owned = dy < 0 || (dy == 0 && dx > 0);
+        let (x, y) = (i64::from(128 - p.x), i64::from(128 + 256 * self.band - p.y));
+        let e = i64::from(a) * x + i64::from(b) * y - i64::from(!owned);
+        let h = (i64::from(a.abs()) + i64::from(b.abs())) * i64::from(128 + self.slack);
+        let (inside, touch) = (((h + 255) >> 8) as i32, ((h + 256) >> 8) as i32);
+        Edge { a, b, c: e >> 8, inside, touch, ends: self.outline.ends >> k & 1 == 1 }
+    }
+
+    /// What edge k takes off where the surface ends at it; else nothing anywhere.
+    #[inline(always)]
+    fn end(&self, k: usize) -> End {
+        let (p, q) = self.ends_of_edge(k);
+        let size = i64::from((q.x - p.x).abs()) + i64::from((q.y - p.y).abs());
+        let slack = i64::from(self.slack);
+        End {
+            least: -((size * slack + 256) >> 8) as i32,
+            most: (size * (128 + slack) >> 8) as i32,
+            around: [
+                first_pixel(p.x.min(q.x), self.slack),
+                first_pixel(p.y.min(q.y), self.slack) - self.band,
+                last_pixel(p.x.max(q.x), self.slack),
+                last_pixel(p.y.max(q.y), self.slack) - self.band,
+            ],
+        }
+    }
+
+    #[inline(always)]
+    fn ends_of_edge(&self, k: usize) -> (&Corner, &Corner) {
+        let next = if k + 1 == self.outline.corners { 0 } else { k + 1 };
+        (&self.outline.corner[k], &self.outline.corner[next])
+    }
+}
+
+/// Pixels and depth from corner 0 to corner k.
+#[inline(always)]
+fn from_first(c: &[Corner; 4], k: usize) -> (f64, f64, f64) {
+    let sub = 1.0 / 256.0;
+    let (x, y) = (f64::from(c[k].x - c[0].x), f64::from(c[k].y - c[0].y));
+    (x * sub, y * sub, f64::from(c[k].depth) - f64::from(c[0].depth))
 }
 
 /// First pixel whose square, widened by the slack, reaches a coordinate.
@@ -309,29 +326,16 @@ fn last_pixel(v: i32, slack: i32) -> i32 {
     (v + slack) >> 8
 }
 
-#[inline(always)]
-fn edge(p: &Corner, q: &Corner, turn: i32, slack: i32, top: i32, ends: bool) -> Edge {
-    let (dx, dy) = ((q.x - p.x) * turn, (q.y - p.y) * turn);
-    let (a, b) = (-dy, dx);
-    // Of an edge and its reverse exactly one owns a point on it.
-    let owned = dy < 0 || (dy == 0 && dx > 0);
-    let (x, y) = (i64::from(128 - p.x), i64::from(128 + 256 * top - p.y));
-    let e = i64::from(a) * x + i64::from(b) * y - i64::from(!owned);
-    let size = i64::from(a.abs()) + i64::from(b.abs());
-    let h = size * i64::from(128 + slack);
-    Edge {
-        a,
-        b,
-        c: e >> 8,
-        inside: ((h + 255) >> 8) as i32,
-        touch: ((h + 256) >> 8) as i32,
-        reach: (h >> 8) as i32,
-        sway: ((size * i64::from(slack) + 256) >> 8) as i32,
-        ends,
-        left: first_pixel(p.x.min(q.x), slack),
-        top: first_pixel(p.y.min(q.y), slack) - top,
-        right: last_pixel(p.x.max(q.x), slack),
-        bottom: last_pixel(p.y.max(q.y), slack) - top,
+impl Edge {
+    #[inline(always)]
+    fn at(&self, x: i32, y: i32) -> i64 {
+        i64::from(self.a) * i64::from(x) + i64::from(self.b) * i64::from(y) + self.c
+    }
+
+    /// Saturated so that steps within a tile cannot overflow and no sign or comparison changes.
+    #[inline(always)]
+    fn at_saturated(&self, x: i32, y: i32) -> i32 {
+        self.at(x, y).clamp(-(1 << 30), (1 << 30) - 1) as i32
     }
 }
 
@@ -347,27 +351,33 @@ pub(super) fn fill<S: Simd>(
     jointly: bool,
 ) {
     let mut face = Face::new(outline, slack, surface.top);
-    let all_end = !jointly && outline.ends == (1 << outline.corners) - 1;
-    let small = face.right - face.left < 16 && face.bottom - face.top < 16;
-    if face.right < 0 || face.bottom < 0 || face.left >= surface.width || face.top >= surface.height {
+    let [left, top, right, bottom] = face.around;
+    if right < 0 || bottom < 0 || left >= surface.width || top >= surface.height {
         return;
     }
-    if all_end && (face.right - face.left < 2 || face.bottom - face.top < 2) {
+    let all_end = !jointly && outline.ends == (1 << outline.corners) - 1;
+    if all_end && (right - left < 2 || bottom - top < 2) {
         // It touches at most two columns or rows; one that covers a pixel touches its neighbours too.
         return;
     }
-    face.set_edges(outline, slack, surface.top);
-    if small && !all_end {
-        if face.right - face.left < 4 && face.bottom - face.top < 4 {
+    if right - left < 16 && bottom - top < 16 && !all_end {
+        if right - left < 4 && bottom - top < 4 {
             // Within so few pixels its farthest corner is as good a bound.
             face.plane = [0.0, 0.0, f64::from(face.farthest)];
         } else {
-            face.set_plane(outline, slack);
+            face.set_plane();
         }
-        fill_small(simd, surface, joint, &face);
+        if outline.corners == 3 {
+            fill_small::<S, 3>(simd, surface, joint, &face);
+        } else {
+            fill_small::<S, 4>(simd, surface, joint, &face);
+        }
     } else {
-        face.set_plane(outline, slack);
-        fill_tiles(simd, surface, joint, &face, jointly);
+        face.set_plane();
+        simd.vectorize(
+            #[inline(always)]
+            || fill_tiles(simd, surface, joint, &face, jointly),
+        );
     }
 }
 
@@ -384,176 +394,210 @@ fn column_bits(from: i32, to: i32) -> u64 {
 }
 
 #[inline(always)]
-fn fill_small<S: Simd>(simd: S, surface: &Surface, joint: &mut Joint, face: &Face) {
-    let (x0, y0) = (face.left.max(0), face.top.max(0));
-    let (x1, y1) = (face.right.min(surface.width - 1), face.bottom.min(surface.height - 1));
+fn fill_small<S: Simd, const N: usize>(simd: S, surface: &Surface, joint: &mut Joint, face: &Face) {
+    let [left, top, right, bottom] = face.around;
+    let (x0, y0) = (left.max(0), top.max(0));
+    let (x1, y1) = (right.min(surface.width - 1), bottom.min(surface.height - 1));
     for tile_y in y0 >> 4..=y1 >> 4 {
         for tile_x in x0 >> 4..=x1 >> 4 {
             joint.mark(surface.tile(tile_x, tile_y));
         }
     }
-    let columns = mask32x16::from_bitmask(simd, column_bits(0, x1 - x0));
-    let plane = face.tile_plane(x0, face.top);
-    rows_into_joint(simd, joint, face, 0b1111, [x0, y0, y1], (plane, face.top), columns);
+    let mut edges = [Edge::default(); N];
+    for (k, edge) in edges.iter_mut().enumerate() {
+        *edge = face.edge(k);
+    }
+    let numbers = [0, 1, 2, 3];
+    let plane = face.tile_plane(x0, top);
+    let place = Place { x: x0, rows: [y0, y1], columns: column_bits(0, x1 - x0), plane_top: top };
+    into_joint::<S, N>(simd, joint, face, &edges, numbers, place, plane);
 }
 
-/// Adds a face to the joint in up to sixteen columns from x0 and the rows from y0 to y1. `edges` are those
-/// that cross there.
+/// Up to sixteen columns, and some rows of them.
+#[derive(Clone, Copy)]
+struct Place {
+    x: i32,
+    rows: [i32; 2],
+    columns: u64,
+    /// Row from which the plane counts.
+    plane_top: i32,
+}
+
+/// Adds a face to the joint. `edges` are those of its edges that matter there, called `numbers`.
 #[inline(always)]
-fn rows_into_joint<S: Simd>(
+fn into_joint<S: Simd, const N: usize>(
     simd: S,
     joint: &mut Joint,
     face: &Face,
-    edges: u32,
-    [x0, y0, y1]: [i32; 3],
-    (plane, plane_top): (TilePlane, i32),
-    columns: mask32x16<S>,
+    edges: &[Edge; N],
+    numbers: [usize; 4],
+    place: Place,
+    plane: TilePlane,
 ) {
     let zero = i32x16::splat(simd, 0);
     let column = columns_i32(simd);
-    let mut e = [zero; 4];
-    for k in 0..face.edges {
-        e[k] = column * face.edge[k].a + at_saturated(&face.edge[k], x0, y0);
+    let mut e = [zero; N];
+    let mut touch_by = [zero; N];
+    let mut end = [End::default(); N];
+    let mut any_end = false;
+    for k in 0..N {
+        e[k] = column * edges[k].a + edges[k].at_saturated(place.x, place.rows[0]);
+        touch_by[k] = i32x16::splat(simd, edges[k].touch);
+        if edges[k].ends {
+            any_end = true;
+            end[k] = face.end(numbers[k]);
+        }
     }
+    let columns = mask32x16::from_bitmask(simd, place.columns);
     let farthest = f32x16::splat(simd, face.farthest);
-    for y in y0..=y1 {
+    let one = i32x16::splat(simd, 1);
+    for y in place.rows[0]..=place.rows[1] {
         let (mut centre, mut touch) = (zero, zero);
-        for k in 0..face.edges {
-            if edges >> k & 1 == 1 {
-                centre |= e[k];
-                touch |= e[k] + face.edge[k].touch;
-            }
+        for k in 0..N {
+            centre |= e[k];
+            touch |= e[k] + touch_by[k];
         }
         let touched = touch.simd_ge(zero) & columns;
-        if touched.any_true() {
-            let at = y as usize * joint.stride + x0 as usize;
-            let depths = &mut joint.depth[at..at + 16];
-            let old = f32x16::from_slice(simd, depths);
-            let depth = plane.row(simd, y - plane_top).max(farthest);
-            touched.select(old.min(depth), old).store_slice(depths);
-            let counts = &mut joint.count[at..at + 16];
-            let mut count = i32x16::from_slice(simd, counts);
-            let covered = centre.simd_ge(zero) & columns;
-            count = covered.select(count + 1, count);
-            for k in 0..face.edges {
-                let edge = &face.edge[k];
-                if edges >> k & 1 == 1 && edge.ends && y >= edge.top && y <= edge.bottom {
-                    let along = column_bits(edge.left - x0, edge.right - x0);
-                    let lost = e[k].simd_ge(i32x16::splat(simd, -edge.sway))
-                        & e[k].simd_le(i32x16::splat(simd, edge.reach))
-                        & columns
+        let at = y as usize * joint.stride + place.x as usize;
+        let depths = &mut joint.depth[at..at + 16];
+        let old = f32x16::from_slice(simd, depths);
+        let depth = plane.row(simd, y - place.plane_top).max(farthest);
+        touched.select(old.min(depth), old).store_slice(depths);
+        let counts = &mut joint.count[at..at + 16];
+        let covered = centre.simd_ge(zero) & columns;
+        let mut count = i32x16::from_slice(simd, counts);
+        count += covered.select(one, zero);
+        if any_end {
+            for k in 0..N {
+                let [left, top, right, bottom] = end[k].around;
+                if edges[k].ends && y >= top && y <= bottom {
+                    let along = column_bits(left - place.x, right - place.x) & place.columns;
+                    let lost = e[k].simd_ge(i32x16::splat(simd, end[k].least))
+                        & e[k].simd_le(i32x16::splat(simd, end[k].most))
                         & mask32x16::from_bitmask(simd, along);
-                    count = lost.select(count - 1, count);
+                    count -= lost.select(one, zero);
                 }
             }
-            count.store_slice(counts);
         }
-        for k in 0..face.edges {
-            e[k] += face.edge[k].b;
+        count.store_slice(counts);
+        for k in 0..N {
+            e[k] += edges[k].b;
         }
     }
 }
 
-#[inline(always)]
-fn at(edge: &Edge, x: i32, y: i32) -> i64 {
-    i64::from(edge.a) * i64::from(x) + i64::from(edge.b) * i64::from(y) + edge.c
-}
-
-/// Saturated so that steps within a tile cannot overflow and no sign or comparison changes.
-#[inline(always)]
-fn at_saturated(edge: &Edge, x: i32, y: i32) -> i32 {
-    at(edge, x, y).clamp(-(1 << 30), (1 << 30) - 1) as i32
+/// Where one tile lies, and what of a face crosses it.
+#[derive(Clone, Copy)]
+struct Crossed {
+    tile: usize,
+    x: i32,
+    y: i32,
+    /// The edges that cross it, the first `count` of these.
+    numbers: [usize; 4],
+    count: usize,
+    /// Whether one of them is shared with another face.
+    shared: bool,
 }
 
 #[inline(always)]
 fn fill_tiles<S: Simd>(simd: S, surface: &mut Surface, joint: &mut Joint, face: &Face, jointly: bool) {
-    let (left, top) = (face.left.max(0) >> 4, face.top.max(0) >> 4);
-    let (right, bottom) = (face.right.min(surface.width - 1) >> 4, face.bottom.min(surface.height - 1) >> 4);
+    let [left, top, right, bottom] = face.around;
+    let (left, top) = (left.max(0) >> 4, top.max(0) >> 4);
+    let (right, bottom) = (right.min(surface.width - 1) >> 4, bottom.min(surface.height - 1) >> 4);
+    let edges_used = face.outline.corners;
+    let mut edges = [Edge::default(); 4];
+    // Least and largest step of e from a tile's first pixel to one of its pixels.
+    let (mut up, mut down) = ([0i64; 4], [0i64; 4]);
+    for k in 0..edges_used {
+        let edge = face.edge(k);
+        up[k] = i64::from(edge.a.max(0) + edge.b.max(0)) * 15 + i64::from(edge.touch);
+        down[k] = i64::from(edge.a.min(0) + edge.b.min(0)) * 15 - i64::from(edge.inside);
+        edges[k] = edge;
+    }
     for tile_y in top..=bottom {
+        let mut was_inside = false;
         for tile_x in left..=right {
             let (x, y) = (tile_x * 16, tile_y * 16);
-            let (mut crossing, mut shared, mut outside) = (0u32, false, false);
-            for (k, edge) in face.edge[..face.edges].iter().enumerate() {
-                let e = at(edge, x, y);
-                let up = i64::from(edge.a.max(0) + edge.b.max(0)) * 15;
-                let down = i64::from(edge.a.min(0) + edge.b.min(0)) * 15;
-                outside |= e + up < i64::from(-edge.touch);
-                if e + down < i64::from(edge.inside) {
-                    crossing |= 1 << k;
-                    shared |= !edge.ends;
+            let tile = surface.tile(tile_x, tile_y);
+            let mut crossed = Crossed { tile, x, y, numbers: [0; 4], count: 0, shared: false };
+            let mut outside = false;
+            for k in 0..edges_used {
+                let e = edges[k].at(x, y);
+                outside |= e + up[k] < 0;
+                if e + down[k] < 0 {
+                    crossed.numbers[crossed.count & 3] = k;
+                    crossed.count += 1;
+                    crossed.shared |= !edges[k].ends;
                 }
             }
-            if !outside {
-                let tile = surface.tile(tile_x, tile_y);
-                let plane = face.tile_plane(x, y);
-                if jointly {
-                    into_joint(simd, surface, joint, face, tile, [x, y], plane, crossing);
-                } else if crossing == 0 {
-                    surface.cover(simd, tile, plane);
-                } else {
-                    fill_tile(simd, surface, joint, face, tile, [x, y], plane, crossing, shared);
+            if outside {
+                if was_inside {
+                    break;
                 }
+                continue;
+            }
+            was_inside = true;
+            let joins = jointly || (crossed.shared && crossed.count > 0);
+            if !joins && surface.tile_min(tile) >= face.nearest {
+                continue;
+            }
+            let plane = face.tile_plane(x, y);
+            if crossed.count == 0 && !jointly {
+                surface.cover(simd, tile, plane);
+                continue;
+            }
+            match crossed.count {
+                0 => fill_tile::<S, 0>(simd, surface, joint, face, &edges, crossed, plane, jointly),
+                1 => fill_tile::<S, 1>(simd, surface, joint, face, &edges, crossed, plane, jointly),
+                2 => fill_tile::<S, 2>(simd, surface, joint, face, &edges, crossed, plane, jointly),
+                3 => fill_tile::<S, 3>(simd, surface, joint, face, &edges, crossed, plane, jointly),
+                _ => fill_tile::<S, 4>(simd, surface, joint, face, &edges, crossed, plane, jointly),
             }
         }
     }
 }
 
-#[expect(clippy::too_many_arguments, reason = "the inner step of one loop, split off to be called twice")]
+#[expect(clippy::too_many_arguments, reason = "the inner step of one loop, split off to be specialised")]
 #[inline(always)]
-fn into_joint<S: Simd>(
-    simd: S,
-    surface: &Surface,
-    joint: &mut Joint,
-    face: &Face,
-    tile: usize,
-    [x, y]: [i32; 2],
-    plane: TilePlane,
-    crossing: u32,
-) {
-    joint.mark(tile);
-    let columns = mask32x16::from_bitmask(simd, column_bits(face.left - x, face.right - x));
-    let rows = [x, face.top.max(y), face.bottom.min(y + 15).min(surface.height - 1)];
-    rows_into_joint(simd, joint, face, crossing, rows, (plane, y), columns);
-}
-
-#[expect(clippy::too_many_arguments, reason = "the inner step of one loop, split off to be read")]
-#[inline(always)]
-fn fill_tile<S: Simd>(
+fn fill_tile<S: Simd, const N: usize>(
     simd: S,
     surface: &mut Surface,
     joint: &mut Joint,
     face: &Face,
-    tile: usize,
-    [x, y]: [i32; 2],
+    all: &[Edge; 4],
+    crossed: Crossed,
     plane: TilePlane,
-    crossing: u32,
-    shared: bool,
+    jointly: bool,
 ) {
-    if shared {
-        into_joint(simd, surface, joint, face, tile, [x, y], plane, crossing);
+    let Crossed { tile, x, y, numbers, .. } = crossed;
+    let mut edges = [Edge::default(); N];
+    for k in 0..N {
+        edges[k] = all[numbers[k]];
     }
-    if surface.tile_min(tile) >= face.nearest {
+    let [left, top, right, bottom] = face.around;
+    let (y0, y1) = (top.max(y), bottom.min(y + 15).min(surface.height - 1));
+    if crossed.shared || jointly {
+        joint.mark(tile);
+        let columns = column_bits(left - x, right - x);
+        let place = Place { x, rows: [y0, y1], columns, plane_top: y };
+        into_joint::<S, N>(simd, joint, face, &edges, numbers, place, plane);
+    }
+    if jointly || surface.tile_min(tile) >= face.nearest {
         return;
     }
     let zero = i32x16::splat(simd, 0);
     let column = columns_i32(simd);
-    let mut e = [zero; 4];
-    let mut used = 0;
-    let mut steps = [0; 4];
-    for k in 0..face.edges {
-        if crossing >> k & 1 == 1 {
-            let edge = &face.edge[k];
-            e[used] = column * edge.a + (at_saturated(edge, x, y) - edge.inside);
-            steps[used] = edge.b;
-            used += 1;
-        }
+    let mut e = [zero; N];
+    for k in 0..N {
+        e[k] = column * edges[k].a + (edges[k].at_saturated(x, y0) - edges[k].inside);
     }
     let farthest = f32x16::splat(simd, face.farthest);
     let mut wrote = false;
-    for row in 0..16 {
-        let mut outside = e[0];
-        for e in &e[1..used] {
-            outside |= *e;
+    for row in y0 - y..=y1 - y {
+        let mut outside = zero;
+        for k in 0..N {
+            outside |= e[k];
+            e[k] += edges[k].b;
         }
         let inside = outside.simd_ge(zero);
         if inside.any_true() {
@@ -563,9 +607,6 @@ fn fill_tile<S: Simd>(
             }
             let depth = plane.row(simd, row).max(farthest);
             surface.raise(simd, tile, row, depth, inside);
-        }
-        for k in 0..used {
-            e[k] += steps[k];
         }
     }
     if wrote {

@@ -24,8 +24,14 @@ pub(super) struct Placed {
 
 impl Placed {
     #[inline(always)]
-    pub fn corner(&self, vertex: usize) -> Corner {
+    fn corner(&self, vertex: u32) -> Corner {
+        let vertex = vertex as usize;
         Corner { x: self.x[vertex], y: self.y[vertex], depth: self.depth[vertex] }
+    }
+
+    #[inline(always)]
+    pub fn corners(&self, v: &[u32; 4]) -> [Corner; 4] {
+        [self.corner(v[0]), self.corner(v[1]), self.corner(v[2]), self.corner(v[3])]
     }
 }
 
@@ -78,18 +84,15 @@ impl Placing {
         placed.y.resize(count, 0);
         placed.depth.resize(count, 0.0);
         let round = f64x8::splat(simd, ROUND);
+        let mut nearest = f32x16::splat(simd, 0.0);
         let mut done = 0;
         while done < count {
             // Sixteen at a time, or the last eight twice.
             let wide = done + 16 <= count;
             let (lo, hi) = (first + done, if wide { first + done + 8 } else { first + done });
-            let load = |list: &[f32]| {
-                let mut both = [0.0f32; 16];
-                both[..8].copy_from_slice(&list[lo..lo + 8]);
-                both[8..].copy_from_slice(&list[hi..hi + 8]);
-                simd.widen_f32x16(f32x16::from_slice(simd, &both))
-            };
-            let (x, y, z) = (load(&vertices.x), load(&vertices.y), load(&vertices.z));
+            let x = load(simd, &vertices.x, lo, hi);
+            let y = load(simd, &vertices.y, lo, hi);
+            let z = load(simd, &vertices.z, lo, hi);
             let low = self.project(simd, [x.0, y.0, z.0]);
             let high = self.project(simd, [x.1, y.1, z.1]);
             let sx: fearless_simd::i32x16<S> =
@@ -97,6 +100,7 @@ impl Placing {
             let sy: fearless_simd::i32x16<S> =
                 simd.narrow_i64x8((low[1] + round).bitcast(), (high[1] + round).bitcast());
             let depth = simd.narrow_f64x8(low[2], high[2]);
+            nearest = nearest.max(depth);
             if wide {
                 sx.store_slice(&mut placed.x[done..done + 16]);
                 sy.store_slice(&mut placed.y[done..done + 16]);
@@ -110,6 +114,7 @@ impl Placing {
                 done += 8;
             }
         }
+        placed.nearest = nearest.reduce_max();
     }
 
     /// Screen x and y in 1/256 pixel, and depth.
@@ -125,6 +130,15 @@ impl Placing {
             [x, y, d - (d.abs() * (1.0 - self.shrink) + 2e-6)]
         }
     }
+}
+
+/// Eight numbers from each of two places, as f64.
+#[inline(always)]
+fn load<S: Simd>(simd: S, list: &[f32], lo: usize, hi: usize) -> (f64x8<S>, f64x8<S>) {
+    let mut both = [0.0f32; 16];
+    both[..8].copy_from_slice(&list[lo..lo + 8]);
+    both[8..].copy_from_slice(&list[hi..hi + 8]);
+    simd.widen_f32x16(f32x16::from_slice(simd, &both))
 }
 
 /// Adding this rounds to a whole number, ties to even, whose low 32 bits are the sum's; for |v| < 2³¹.

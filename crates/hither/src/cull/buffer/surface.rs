@@ -42,9 +42,8 @@ impl TilePlane {
     #[inline(always)]
     fn above(&self, other: &TilePlane) -> bool {
         let roundings = (self.size() + other.size()) * 1e-6;
-        [(0, 0), (15, 0), (0, 15), (15, 15)]
-            .into_iter()
-            .all(|(x, y)| self.at(x, y) >= other.at(x, y) + roundings)
+        let beats = |x: i32, y: i32| self.at(x, y) >= other.at(x, y) + roundings;
+        beats(0, 0) && beats(15, 0) && beats(0, 15) && beats(15, 15)
     }
 
     /// No term or sum is larger.
@@ -251,18 +250,54 @@ impl Surface {
     #[inline(always)]
     pub fn refresh<S: Simd>(&mut self, simd: S) {
         while let Some(tile) = self.stale.pop() {
-            let tile = tile as usize;
-            self.is_stale[tile] = false;
-            if self.kind[tile] != Kind::Pixels {
-                continue;
-            }
-            let rows = &self.rows[tile * 16..tile * 16 + 16];
-            let mut least = f32x16::from_slice(simd, &rows[0].0);
-            for row in &rows[1..] {
-                least = least.min(f32x16::from_slice(simd, &row.0));
-            }
-            self.set_min(simd, tile, least.reduce_min());
+            self.refresh_tile(simd, tile as usize);
         }
+    }
+
+    #[inline(always)]
+    fn refresh_tile<S: Simd>(&mut self, simd: S, tile: usize) {
+        if !self.is_stale[tile] {
+            return;
+        }
+        self.is_stale[tile] = false;
+        if self.kind[tile] != Kind::Pixels {
+            return;
+        }
+        let rows = &self.rows[tile * 16..tile * 16 + 16];
+        let mut least = f32x16::from_slice(simd, &rows[0].0);
+        for row in &rows[1..] {
+            least = least.min(f32x16::from_slice(simd, &row.0));
+        }
+        self.set_min(simd, tile, least.reduce_min());
+    }
+
+    /// As [`Surface::all_nearer`], while minima may be stale (too far: still bounds): those that matter are
+    /// brought up to date.
+    #[inline(always)]
+    pub fn all_nearer_now<S: Simd>(&mut self, simd: S, rect: [i32; 4], depth: f32) -> bool {
+        let [left, top, right, bottom] = rect;
+        for y in top >> 6..=bottom >> 6 {
+            for x in left >> 6..=right >> 6 {
+                if self.cell_min(x, y) > depth {
+                    continue;
+                }
+                let inner =
+                    [left.max(x * 64), top.max(y * 64), right.min(x * 64 + 63), bottom.min(y * 64 + 63)];
+                for tile_y in inner[1] >> 4..=inner[3] >> 4 {
+                    for tile_x in inner[0] >> 4..=inner[2] >> 4 {
+                        let tile = self.tile(tile_x, tile_y);
+                        if self.tile_min(tile) > depth {
+                            continue;
+                        }
+                        self.refresh_tile(simd, tile);
+                        if !self.tile_is_nearer(simd, tile, [tile_x, tile_y], inner, depth) {
+                            return false;
+                        }
+                    }
+                }
+            }
+        }
+        true
     }
 
     #[inline(always)]
@@ -303,23 +338,32 @@ impl Surface {
         for y in top >> 4..=bottom >> 4 {
             for x in left >> 4..=right >> 4 {
                 let tile = self.tile(x, y);
-                if self.tile_min(tile) > depth {
-                    continue;
-                }
-                let (x, y) = (x * 16, y * 16);
-                let (x0, y0, x1, y1) =
-                    ((left - x).max(0), (top - y).max(0), (right - x).min(15), (bottom - y).min(15));
-                let nearer = match self.kind[tile] {
-                    Kind::Empty => false,
-                    Kind::Plane => self.plane[tile].min(x0, y0, x1, y1) > depth,
-                    Kind::Pixels => self.rows_are_nearer(simd, tile, [x0, y0, x1, y1], depth),
-                };
-                if !nearer {
+                if !self.tile_is_nearer(simd, tile, [x, y], rect, depth) {
                     return false;
                 }
             }
         }
         true
+    }
+
+    /// Whether all that lies of `rect` in a tile holds more than `depth`.
+    #[inline(always)]
+    fn tile_is_nearer<S: Simd>(&self, simd: S, tile: usize, [x, y]: [i32; 2], rect: [i32; 4], depth: f32) -> bool {
+        if self.tile_min(tile) > depth {
+            return true;
+        }
+        let (x, y) = (x * 16, y * 16);
+        let inner = [
+            (rect[0] - x).max(0),
+            (rect[1] - y).max(0),
+            (rect[2] - x).min(15),
+            (rect[3] - y).min(15),
+        ];
+        match self.kind[tile] {
+            Kind::Empty => false,
+            Kind::Plane => self.plane[tile].min(inner[0], inner[1], inner[2], inner[3]) > depth,
+            Kind::Pixels => self.rows_are_nearer(simd, tile, inner, depth),
+        }
     }
 
     #[inline(always)]
@@ -328,11 +372,15 @@ impl Surface {
         let columns = (0xFFFF << x0) & (0xFFFF >> (15 - x1));
         let threshold = f32x16::splat(simd, depth);
         let rows = &self.rows[tile * 16 + y0 as usize..=tile * 16 + y1 as usize];
-        // Asked this way round, a depth that is no number is nearer than nothing.
-        rows.iter().all(|row| {
+        // Asked this way round, a depth that is no number is nearer than nothing. A loop, not a closure: those
+        // are not always inlined, and then lose the instruction set.
+        for row in rows {
             let nearer = f32x16::from_slice(simd, &row.0).simd_gt(threshold).to_bitmask() as i32;
-            nearer & columns == columns
-        })
+            if nearer & columns != columns {
+                return false;
+            }
+        }
+        true
     }
 
     /// Depth at a pixel of the surface.
