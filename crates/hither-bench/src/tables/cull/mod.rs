@@ -74,9 +74,17 @@ fn make(table: &mut Table, options: &Options) -> Result<(), String> {
             ]);
         }
     }
-    table.notes.push("draw: clear, then the scene as one occluder. shuffled: each object an occluder of its own, in".into());
-    table.notes.push("a random order; the verdicts are the same. False visible: in view, truly hidden, not found to".into());
-    table.notes.push("be; share of those in view. Truth: 4x4 samples a pixel. Peers: the best of Intel's MSOC and".into());
+    table.notes.push(
+        "draw: clear, then the scene as one occluder. shuffled: each object an occluder of its own, in"
+            .into(),
+    );
+    table.notes.push(
+        "a random order; the verdicts are the same. False visible: in view, truly hidden, not found to"
+            .into(),
+    );
+    table.notes.push(
+        "be; share of those in view. Truth: 4x4 samples a pixel. Peers: the best of Intel's MSOC and".into(),
+    );
     table.notes.push("RAWR, measured on a Sapphire Rapids Xeon; neither is conservative.".into());
     Ok(())
 }

@@ -2,10 +2,10 @@
 //! near as the nearest surface.
 
 use glam::DVec3;
+use hither::SceneIndex;
 use hither::conventions::{Projection, View};
 use hither::geometry::Aabb;
 use hither::render::{Frame, RenderOptions, render};
-use hither::SceneIndex;
 
 /// Samples along each side of a pixel.
 const SIDE: u32 = 4;
@@ -52,7 +52,8 @@ impl Depths {
         let Projection::Perspective { near, .. } = view.projection else { return true };
         let corners = (0..8).map(|k| {
             let pick = |bit: usize, low: f64, high: f64| if k >> bit & 1 == 0 { low } else { high };
-            let p = DVec3::new(pick(0, b.min.x, b.max.x), pick(1, b.min.y, b.max.y), pick(2, b.min.z, b.max.z));
+            let p =
+                DVec3::new(pick(0, b.min.x, b.max.x), pick(1, b.min.y, b.max.y), pick(2, b.min.z, b.max.z));
             view.view_from_world.transform_point3(p)
         });
         let corners: Vec<DVec3> = corners.collect();
@@ -67,7 +68,12 @@ impl Depths {
         if !crosses {
             let x = || corners.iter().map(|p| p.x / -p.z * scale + w * 0.5);
             let y = || corners.iter().map(|p| -p.y / -p.z * scale + h * 0.5);
-            rect = [x().fold(w, f64::min), y().fold(h, f64::min), x().fold(0.0, f64::max), y().fold(0.0, f64::max)];
+            rect = [
+                x().fold(w, f64::min),
+                y().fold(h, f64::min),
+                x().fold(0.0, f64::max),
+                y().fold(0.0, f64::max),
+            ];
             nearest = corners.iter().map(|p| -p.z).fold(f64::INFINITY, f64::min);
         }
         self.shows_in(b, rect, nearest)

@@ -106,7 +106,8 @@ pub(crate) fn project<S: Simd>(
         (least_w, w_error) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
         depth = largest(&d) + d_error;
         clear = depth.simd_le(f32x16::splat(simd, 1.0));
-        inside = (smallest(&d) - d_error).simd_le(f32x16::splat(simd, 1.0)) & depth.simd_gt(f32x16::splat(simd, 0.0));
+        inside = (smallest(&d) - d_error).simd_le(f32x16::splat(simd, 1.0))
+            & depth.simd_gt(f32x16::splat(simd, 0.0));
         low = [smallest(&x), smallest(&y)];
         high = [largest(&x), largest(&y)];
     }
@@ -119,10 +120,11 @@ pub(crate) fn project<S: Simd>(
         let from = low[k] - margin - 1e-6;
         let to = high[k] + margin + 1e-6;
         within &= from.simd_gt(f32x16::splat(simd, -8000.0)) & to.simd_lt(f32x16::splat(simd, 24000.0));
-        uncut &= from.simd_gt(f32x16::splat(simd, view.ring)) & to.simd_lt(f32x16::splat(simd, size - view.ring));
+        uncut &=
+            from.simd_gt(f32x16::splat(simd, view.ring)) & to.simd_lt(f32x16::splat(simd, size - view.ring));
         // Asked this way round, what is no number is seen.
-        let unseen = from.simd_gt(f32x16::splat(simd, size + view.ring))
-            | to.simd_lt(f32x16::splat(simd, -view.ring));
+        let unseen =
+            from.simd_gt(f32x16::splat(simd, size + view.ring)) | to.simd_lt(f32x16::splat(simd, -view.ring));
         inside &= !(unseen & clear);
         let far = f32x16::splat(simd, 1e30);
         certain &= from.abs().simd_lt(far) & to.abs().simd_lt(far);

@@ -5,11 +5,13 @@ use super::ask::{BoxView, project};
 use super::clip::{Clipped, EdgeOf, clip, doubled_area};
 use super::fill::{Joint, Outline, fill};
 use super::occluder::{ENDS, Face, Occluder, Patch};
-use super::place::{Placed, Placing};
+use super::place::{Placed, Placing, Sizes};
 use super::surface::Surface;
 use crate::index::{Child, Slot};
 use crate::raster::ScreenFromObject;
 use fearless_simd::Simd;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 /// Rows of the image, and what is needed to draw into them.
 #[derive(Clone, Debug)]
@@ -20,7 +22,7 @@ pub(super) struct Band {
     /// For each face of a patch +1 or −1, its turn on the screen, or 0 if it is not drawn.
     turns: Vec<i8>,
     clipped: Vec<(u32, [Option<Clipped>; 2])>,
-    open: Vec<Open>,
+    open: BinaryHeap<Open>,
 }
 
 /// A part of an occluder's tree that may show.
@@ -32,12 +34,34 @@ struct Open {
     clear: bool,
 }
 
+impl Ord for Open {
+    /// The nearest is the greatest.
+    fn cmp(&self, o: &Open) -> Ordering {
+        self.depth.total_cmp(&o.depth)
+    }
+}
+
+impl PartialOrd for Open {
+    fn partial_cmp(&self, o: &Open) -> Option<Ordering> {
+        Some(self.cmp(o))
+    }
+}
+
+impl PartialEq for Open {
+    fn eq(&self, o: &Open) -> bool {
+        self.cmp(o) == Ordering::Equal
+    }
+}
+
+impl Eq for Open {}
+
 /// An occluder in its place.
 #[derive(Clone, Copy)]
 pub(super) struct Standing<'a> {
     pub occluder: &'a Occluder,
     pub at: ScreenFromObject,
     pub boxes: BoxView,
+    pub sizes: Sizes,
     /// How far the eye may move relative to it, metres, and pixels a metre at distance 1 across the image.
     pub margin: Option<(f64, f64)>,
 }
@@ -46,7 +70,14 @@ impl Band {
     pub fn new(width: u32, top: u32, height: u32) -> Band {
         let surface = Surface::new(width, top, height);
         let joint = Joint::new(&surface);
-        Band { surface, joint, placed: Placed::default(), turns: vec![], clipped: vec![], open: vec![] }
+        Band {
+            surface,
+            joint,
+            placed: Placed::default(),
+            turns: vec![],
+            clipped: vec![],
+            open: BinaryHeap::new(),
+        }
     }
 
     /// The part of an image's rectangle (inclusive) in this band, in its own rows.
@@ -97,7 +128,7 @@ impl Band {
                     let patch = &standing.occluder.patches[patch as usize];
                     simd.vectorize(
                         #[inline(always)]
-                        || self.draw_patch(simd, standing, patch, open.clear, drawn),
+                        || self.draw_patch(simd, standing, patch, open, drawn),
                     );
                 }
             }
@@ -108,7 +139,7 @@ impl Band {
         );
     }
 
-    /// Opens the children of a node that the image may show, the nearest last.
+    /// Opens the children of a node that the image may show.
     #[inline(always)]
     fn visit<S: Simd>(&mut self, simd: S, standing: &Standing, node: u32) {
         let node = &standing.occluder.tree.nodes[node as usize];
@@ -117,7 +148,6 @@ impl Band {
             || project(simd, &standing.boxes, &node.min, &node.max),
         );
         let mut rest = u32::from(boxes.inside) & (0xFFFF >> (16 - node.used));
-        let first = self.open.len();
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize;
             rest &= rest - 1;
@@ -128,11 +158,6 @@ impl Band {
             }
             let open = Open { slot: node.child[lane], rect, depth: boxes.depth[lane], clear };
             self.open.push(open);
-            let mut at = self.open.len() - 1;
-            while at > first && self.open[at - 1].depth > open.depth {
-                self.open.swap(at - 1, at);
-                at -= 1;
-            }
         }
     }
 
@@ -142,23 +167,17 @@ impl Band {
         simd: S,
         standing: &Standing,
         patch: &Patch,
-        clear: bool,
+        Open { clear, depth, .. }: Open,
         drawn: &mut Drawn,
     ) {
-        let bounds = patch.bounds.to_aabb();
-        let (center, half) = (bounds.center().to_array(), (bounds.size() * 0.5).to_array());
         let near = standing.at.d[3];
-        let least_w = if !standing.at.perspective {
-            1.0
-        } else if clear {
-            let w = &standing.at.w;
-            let least = (0..3).fold(w[3], |sum, k| sum + w[k] * center[k] - w[k].abs() * half[k]);
-            least.max(near)
-        } else {
-            near
+        // depth ≥ near / W for all of the patch.
+        let least_w = match standing.at.perspective {
+            true if clear => near / f64::from(depth),
+            true => near,
+            false => 1.0,
         };
-        let reach = patch.bounds.reach();
-        let Some(placing) = Placing::new(&standing.at, reach, least_w) else { return };
+        let Some(placing) = Placing::new(&standing.at, &standing.sizes, least_w) else { return };
         let faces = &standing.occluder.faces[patch.first_face as usize..][..patch.faces as usize];
         self.clipped.clear();
         if clear {

@@ -281,6 +281,19 @@ impl<'a> Face<'a> {
         Edge { a, b, c: e >> 8, inside, touch, ends: self.outline.ends >> k & 1 == 1 }
     }
 
+    /// Edge k of a face of at most sixteen pixels each way, and e at a pixel beside it: 32 bits hold all.
+    #[inline(always)]
+    fn edge_nearby(&self, k: usize, x: i32, y: i32) -> (Edge, i32) {
+        let (p, q) = self.ends_of_edge(k);
+        let turn = self.outline.turn;
+        let (dx, dy) = ((q.x - p.x) * turn, (q.y - p.y) * turn);
+        let owned = dy < 0 || (dy == 0 && dx > 0);
+        let (from_x, from_y) = (256 * x + 128 - p.x, 256 * (y + self.band) + 128 - p.y);
+        let e = dx * from_y - dy * from_x - i32::from(!owned);
+        let touch = ((dx.abs() + dy.abs()) * (128 + self.slack) + 256) >> 8;
+        (Edge { a: -dy, b: dx, c: 0, inside: 0, touch, ends: self.outline.ends >> k & 1 == 1 }, e >> 8)
+    }
+
     /// What edge k takes off where the surface ends at it; else nothing anywhere.
     #[inline(always)]
     fn end(&self, k: usize) -> End {
@@ -403,14 +416,15 @@ fn fill_small<S: Simd, const N: usize>(simd: S, surface: &Surface, joint: &mut J
             joint.mark(surface.tile(tile_x, tile_y));
         }
     }
+    let mut first = [0; N];
     let mut edges = [Edge::default(); N];
-    for (k, edge) in edges.iter_mut().enumerate() {
-        *edge = face.edge(k);
+    for k in 0..N {
+        (edges[k], first[k]) = face.edge_nearby(k, x0, y0);
     }
     let numbers = [0, 1, 2, 3];
     let plane = face.tile_plane(x0, top);
     let place = Place { x: x0, rows: [y0, y1], columns: column_bits(0, x1 - x0), plane_top: top };
-    into_joint::<S, N>(simd, joint, face, &edges, numbers, place, plane);
+    into_joint::<S, N>(simd, joint, face, &edges, first, numbers, place, plane);
 }
 
 /// Up to sixteen columns, and some rows of them.
@@ -423,13 +437,16 @@ struct Place {
     plane_top: i32,
 }
 
-/// Adds a face to the joint. `edges` are those of its edges that matter there, called `numbers`.
+/// Adds a face to the joint. `edges` are those of its edges that matter there, called `numbers`, which are
+/// `first` at the first pixel.
+#[expect(clippy::too_many_arguments, reason = "the inner step of one loop, split off to be specialised")]
 #[inline(always)]
 fn into_joint<S: Simd, const N: usize>(
     simd: S,
     joint: &mut Joint,
     face: &Face,
     edges: &[Edge; N],
+    first: [i32; N],
     numbers: [usize; 4],
     place: Place,
     plane: TilePlane,
@@ -441,7 +458,7 @@ fn into_joint<S: Simd, const N: usize>(
     let mut end = [End::default(); N];
     let mut any_end = false;
     for k in 0..N {
-        e[k] = column * edges[k].a + edges[k].at_saturated(place.x, place.rows[0]);
+        e[k] = column * edges[k].a + first[k];
         touch_by[k] = i32x16::splat(simd, edges[k].touch);
         if edges[k].ends {
             any_end = true;
@@ -580,7 +597,11 @@ fn fill_tile<S: Simd, const N: usize>(
         joint.mark(tile);
         let columns = column_bits(left - x, right - x);
         let place = Place { x, rows: [y0, y1], columns, plane_top: y };
-        into_joint::<S, N>(simd, joint, face, &edges, numbers, place, plane);
+        let mut first = [0; N];
+        for k in 0..N {
+            first[k] = edges[k].at_saturated(x, y0);
+        }
+        into_joint::<S, N>(simd, joint, face, &edges, first, numbers, place, plane);
     }
     if jointly || surface.tile_min(tile) >= face.nearest {
         return;

@@ -75,6 +75,7 @@ use ask::BoxView;
 use draw::{Band, Standing};
 use fearless_simd::{Level, dispatch};
 use glam::DAffine3;
+use place::Sizes;
 
 /// What may be chosen about an [`OcclusionBuffer`].
 #[derive(Clone, Copy, Debug)]
@@ -166,7 +167,8 @@ impl Frame {
     fn standing<'a>(&self, occluder: &'a Occluder, world_from_object: &DAffine3) -> Standing<'a> {
         let at = self.screen_from_world.after(world_from_object);
         let boxes = BoxView::new(&at, self.view.width, self.view.height);
-        Standing { occluder, at, boxes, margin: self.margin() }
+        let sizes = Sizes::new(&at, occluder.tree.bounds().reach());
+        Standing { occluder, at, boxes, sizes, margin: self.margin() }
     }
 }
 

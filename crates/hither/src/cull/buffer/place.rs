@@ -35,6 +35,30 @@ impl Placed {
     }
 }
 
+/// A transform, and the sizes that its sums may reach.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sizes {
+    screen: f64,
+    w: f64,
+    depth: f64,
+}
+
+impl Sizes {
+    /// For points whose coordinates are at most `reach` in magnitude.
+    ///
+    /// *Bound.* A dot product of three terms and a constant in f64, whose coefficients went through two
+    /// products of matrices, is off by at most 16·2⁻⁵³ of the sum of the terms' magnitudes.
+    pub fn new(at: &ScreenFromObject, reach: [f64; 3]) -> Sizes {
+        let size = |r: &[f64; 4]| {
+            let terms = r[0].abs() * reach[0] + r[1].abs() * reach[1] + r[2].abs() * reach[2] + r[3].abs();
+            terms * 2f64.powi(-49)
+        };
+        let w = if at.perspective { size(&at.w) } else { 0.0 };
+        let depth = if at.perspective { 0.0 } else { size(&at.d) };
+        Sizes { screen: size(&at.x).max(size(&at.y)), w, depth }
+    }
+}
+
 /// A transform with what its arithmetic may be off by.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placing {
@@ -46,23 +70,16 @@ pub(super) struct Placing {
 }
 
 impl Placing {
-    /// For points whose coordinates are at most `reach` in magnitude and whose W is at least `least_w`. `None`
-    /// where f64 could not tell where on the screen they are.
-    ///
-    /// *Bound.* A dot product of three terms and a constant in f64, after coefficients that went through two
-    /// products of matrices, is off by at most 16·2⁻⁵³ of the sum of the terms' magnitudes; a quotient's
-    /// error follows from the numerator's and W's.
-    pub fn new(at: &ScreenFromObject, reach: [f64; 3], least_w: f64) -> Option<Placing> {
-        let size = |r: &[f64; 4]| {
-            (r[0].abs() * reach[0] + r[1].abs() * reach[1] + r[2].abs() * reach[2] + r[3].abs())
-                * 2f64.powi(-49)
-        };
-        let w_error = if at.perspective { size(&at.w) / least_w } else { 0.0 };
-        let off = size(&at.x).max(size(&at.y)) / least_w + GUARD_MAX * 256.0 * w_error;
-        let depth_error = if at.perspective { 0.0 } else { size(&at.d) };
+    /// For points whose W is at least `least_w`. `None` where f64 could not tell where on the screen they are.
+    /// A quotient's error follows from the numerator's and W's.
+    #[inline(always)]
+    pub fn new(at: &ScreenFromObject, sizes: &Sizes, least_w: f64) -> Option<Placing> {
+        let inverse = 1.0 / least_w;
+        let w_error = sizes.w * inverse;
+        let off = sizes.screen * inverse + GUARD_MAX * 256.0 * w_error;
         // Half a unit for snapping; the rest, rounded up.
         let slack = 1.0 + (off * 2.0).floor();
-        if !(slack < 4096.0 && w_error < 1e-3 && depth_error < 1e-6) {
+        if !(slack < 4096.0 && w_error < 1e-3 && sizes.depth < 1e-6) {
             return None;
         }
         Some(Placing { at: *at, slack: slack as i32, shrink: 1.0 - 2f64.powi(-22) - 2.0 * w_error })
@@ -102,15 +119,15 @@ impl Placing {
             let depth = simd.narrow_f64x8(low[2], high[2]);
             nearest = nearest.max(depth);
             if wide {
-                sx.store_slice(&mut placed.x[done..done + 16]);
-                sy.store_slice(&mut placed.y[done..done + 16]);
-                depth.store_slice(&mut placed.depth[done..done + 16]);
+                sx.store_slice(&mut placed.x[done..][..16]);
+                sy.store_slice(&mut placed.y[done..][..16]);
+                depth.store_slice(&mut placed.depth[done..][..16]);
                 done += 16;
             } else {
                 let (x, y, d): ([i32; 16], [i32; 16], [f32; 16]) = (sx.into(), sy.into(), depth.into());
-                placed.x[done..].copy_from_slice(&x[..8]);
-                placed.y[done..].copy_from_slice(&y[..8]);
-                placed.depth[done..].copy_from_slice(&d[..8]);
+                placed.x[done..][..8].copy_from_slice(&x[..8]);
+                placed.y[done..][..8].copy_from_slice(&y[..8]);
+                placed.depth[done..][..8].copy_from_slice(&d[..8]);
                 done += 8;
             }
         }
@@ -136,8 +153,8 @@ impl Placing {
 #[inline(always)]
 fn load<S: Simd>(simd: S, list: &[f32], lo: usize, hi: usize) -> (f64x8<S>, f64x8<S>) {
     let mut both = [0.0f32; 16];
-    both[..8].copy_from_slice(&list[lo..lo + 8]);
-    both[8..].copy_from_slice(&list[hi..hi + 8]);
+    both[..8].copy_from_slice(&list[lo..][..8]);
+    both[8..].copy_from_slice(&list[hi..][..8]);
     simd.widen_f32x16(f32x16::from_slice(simd, &both))
 }
 

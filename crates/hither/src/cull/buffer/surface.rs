@@ -348,17 +348,20 @@ impl Surface {
 
     /// Whether all that lies of `rect` in a tile holds more than `depth`.
     #[inline(always)]
-    fn tile_is_nearer<S: Simd>(&self, simd: S, tile: usize, [x, y]: [i32; 2], rect: [i32; 4], depth: f32) -> bool {
+    fn tile_is_nearer<S: Simd>(
+        &self,
+        simd: S,
+        tile: usize,
+        [x, y]: [i32; 2],
+        rect: [i32; 4],
+        depth: f32,
+    ) -> bool {
         if self.tile_min(tile) > depth {
             return true;
         }
         let (x, y) = (x * 16, y * 16);
-        let inner = [
-            (rect[0] - x).max(0),
-            (rect[1] - y).max(0),
-            (rect[2] - x).min(15),
-            (rect[3] - y).min(15),
-        ];
+        let inner =
+            [(rect[0] - x).max(0), (rect[1] - y).max(0), (rect[2] - x).min(15), (rect[3] - y).min(15)];
         match self.kind[tile] {
             Kind::Empty => false,
             Kind::Plane => self.plane[tile].min(inner[0], inner[1], inner[2], inner[3]) > depth,
