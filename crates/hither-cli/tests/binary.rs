@@ -306,3 +306,41 @@ fn a_reader_that_leaves_early_is_no_error() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(output.stderr.is_empty());
 }
+
+#[test]
+fn cull_names_what_could_be_seen_and_leaves_out_nothing_that_is() {
+    let report = |method: &str, more: &[&str]| -> Value {
+        let mut arguments =
+            vec!["cull", "world:office?n=3", "--size", "320x200", "--method", method, "--json", "-"];
+        arguments.extend(more);
+        serde_json::from_slice(&done(&arguments).stdout).unwrap()
+    };
+    let buffer = report("buffer", &["--reasons"]);
+    assert_eq!(buffer["schema"], "hither.cull/1");
+    assert_eq!(buffer["frames"].as_array().unwrap().len(), 1);
+    let frame = &buffer["frames"][0];
+    let visible = |frame: &Value| -> Vec<u64> {
+        frame["visible"].as_array().unwrap().iter().map(|v| v["instance"].as_u64().unwrap()).collect()
+    };
+    let (found, exact) = (visible(frame), visible(&report("exact", &[])["frames"][0]));
+    assert!(exact.iter().all(|i| found.contains(i)), "{exact:?} {found:?}");
+    assert!(found.len() < 27, "{found:?}");
+    assert!(frame["visible"][0]["name"].as_str().unwrap().contains("module"));
+    assert!(frame["counters"]["occluders"].as_u64().unwrap() > 0 && frame["time_ms"].is_number());
+    let judged =
+        frame["reasons"].as_array().unwrap().iter().map(|r| r["count"].as_u64().unwrap()).sum::<u64>();
+    assert_eq!(judged, 27);
+    let walk = report("buffer", &["--frames", "0..3", "--coherence", "--camera", "walk", "--margin", "0.1"]);
+    assert_eq!(walk["frames"].as_array().unwrap().len(), 3);
+}
+
+#[test]
+fn cull_refuses_what_it_cannot_do() {
+    refused(&["cull", WORLD, "--method", "guess"], 2, &["guess", "buffer", "exact"]);
+    refused(&["cull", WORLD, "--margin", "-1"], 2, &["--margin", "metres"]);
+    refused(&["cull", WORLD, "--margin", "nan"], 2, &["--margin", "metres"]);
+    refused(&["cull", WORLD, "--method", "exact", "--margin", "1"], 2, &["--margin", "buffer"]);
+    refused(&["cull", WORLD, "--size", "0x10"], 1, &["0x10"]);
+    refused(&["cull", WORLD, "--size", "16385x10"], 1, &["16385x10"]);
+    refused(&["cull", "no-such.glb"], 1, &["no-such.glb"]);
+}

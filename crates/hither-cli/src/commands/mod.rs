@@ -1,6 +1,7 @@
 //! The commands: each reads its options, lets the engine work, and says what came out.
 
 mod bench;
+mod cull;
 mod demo;
 mod info;
 mod render;
@@ -19,6 +20,8 @@ pub enum Command {
     World(world::Arguments),
     /// What does it look like?
     Render(Box<render::Arguments>),
+    /// What could be seen?
+    Cull(Box<cull::Arguments>),
     /// How fast, against what?
     Bench(bench::Arguments),
 }
@@ -29,6 +32,7 @@ pub fn run(command: Option<Command>) -> Result<(), Failure> {
         Some(Command::Info(arguments)) => info::run(&arguments),
         Some(Command::World(arguments)) => world::run(&arguments),
         Some(Command::Render(arguments)) => render::run(&arguments),
+        Some(Command::Cull(arguments)) => cull::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         None => demo::run(),
     }

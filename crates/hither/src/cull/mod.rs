@@ -2,14 +2,17 @@
 //!
 //! [`OcclusionBuffer`] is the small interface that an engine wants: draw occluders, ask about boxes, balls,
 //! rectangles and meshes, in any order. What it calls hidden is hidden in the continuous image, whatever the
-//! buffer's resolution.
+//! buffer's resolution. [`Culler`] does that for a whole scene: it chooses the occluders and returns the instances
+//! that may be seen, front to back.
 
 mod buffer;
+mod scene;
 
 pub use buffer::{
     Boxes, CannotMerge, Drawn, Occluder, OccluderError, OcclusionBuffer, OcclusionOptions, ScreenRect,
     SharedBuffer, Sides,
 };
+pub use scene::{CullCounters, CullOptions, Culler, Culling, Judged, Reason, cull};
 
 /// What is known about something that was asked about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

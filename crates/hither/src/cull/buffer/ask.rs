@@ -23,8 +23,9 @@ pub(crate) struct BoxView {
     height: f32,
     /// Whether f32 can hold the numbers; else every box is seen everywhere.
     in_range: bool,
-    /// Pixels beyond the image's border that an eye within the margin may see.
-    pub ring: f32,
+    /// How far the eye may move, metres, and pixels that a metre covers at distance 1: what lies beyond the
+    /// image's border by no more than their product over its distance may come into view.
+    pub margin: [f32; 2],
 }
 
 /// Where sixteen boxes lie.
@@ -59,7 +60,7 @@ impl BoxView {
             perspective: at.perspective,
             width: width as f32,
             height: height as f32,
-            ring: 0.0,
+            margin: [0.0; 2],
         }
     }
 }
@@ -88,7 +89,7 @@ pub(crate) fn project<S: Simd>(
         least_w = smallest(&w) - w_error;
         let near = f32x16::splat(simd, view.d[3] * 1.000_001);
         clear = least_w.simd_gt(near) & least_w.simd_gt(w_error * 8.0);
-        inside = (largest(&w) + w_error).simd_ge(f32x16::splat(simd, view.d[3] * 0.999_999));
+        inside = (largest(&w) + w_error).simd_ge(f32x16::splat(simd, view.d[3] * 0.999_999 - view.margin[0]));
         depth = near / least_w * 1.000_001;
         for c in 0..8 {
             let reciprocal = f32x16::splat(simd, 1.0) / w[c];
@@ -111,6 +112,7 @@ pub(crate) fn project<S: Simd>(
         low = [smallest(&x), smallest(&y)];
         high = [largest(&x), largest(&y)];
     }
+    let ring = f32x16::splat(simd, view.margin[0] * view.margin[1] * 1.000_001) / least_w;
     let mut rect = [f32x16::splat(simd, 0.0); 4];
     let (mut within, mut uncut, mut certain) = (clear, clear, clear);
     for (k, (size, error)) in [(view.width, x_error), (view.height, y_error)].into_iter().enumerate() {
@@ -120,11 +122,9 @@ pub(crate) fn project<S: Simd>(
         let from = low[k] - margin - 1e-6;
         let to = high[k] + margin + 1e-6;
         within &= from.simd_gt(f32x16::splat(simd, -8000.0)) & to.simd_lt(f32x16::splat(simd, 24000.0));
-        uncut &=
-            from.simd_gt(f32x16::splat(simd, view.ring)) & to.simd_lt(f32x16::splat(simd, size - view.ring));
+        uncut &= from.simd_gt(ring) & to.simd_lt(ring * -1.0 + size);
         // Asked this way round, what is no number is seen.
-        let unseen =
-            from.simd_gt(f32x16::splat(simd, size + view.ring)) | to.simd_lt(f32x16::splat(simd, -view.ring));
+        let unseen = from.simd_gt(ring + size) | to.simd_lt(ring * -1.0);
         inside &= !(unseen & clear);
         let far = f32x16::splat(simd, 1e30);
         certain &= from.abs().simd_lt(far) & to.abs().simd_lt(far);
@@ -198,7 +198,7 @@ fn beyond_a_side<S: Simd>(
     hi: &[f32x16<S>; 3],
     errors: [f32x16<S>; 2],
 ) -> u16 {
-    if view.ring > 0.0 {
+    if view.margin[0] > 0.0 {
         return 0;
     }
     let one = f32x16::splat(simd, 1.0);

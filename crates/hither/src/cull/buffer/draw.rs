@@ -15,8 +15,8 @@ use std::collections::BinaryHeap;
 
 /// Rows of the image, and what is needed to draw into them.
 #[derive(Clone, Debug)]
-pub(super) struct Band {
-    pub surface: Surface,
+pub(in crate::cull) struct Band {
+    pub(super) surface: Surface,
     joint: Joint,
     placed: Placed,
     /// For each face of a patch +1 or −1, its turn on the screen, or 0 if it is not drawn.
@@ -57,13 +57,15 @@ impl Eq for Open {}
 
 /// An occluder in its place.
 #[derive(Clone, Copy)]
-pub(super) struct Standing<'a> {
+pub(in crate::cull) struct Standing<'a> {
     pub occluder: &'a Occluder,
     pub at: ScreenFromObject,
     pub boxes: BoxView,
-    pub sizes: Sizes,
+    pub(super) sizes: Sizes,
     /// How far the eye may move relative to it, metres, and pixels a metre at distance 1 across the image.
     pub margin: Option<(f64, f64)>,
+    /// Patches that touch fewer pixels across or down than this are not worth drawing.
+    pub least_px: i32,
 }
 
 impl Band {
@@ -78,6 +80,16 @@ impl Band {
             clipped: vec![],
             open: BinaryHeap::new(),
         }
+    }
+
+    /// Whether it is all of an image of this size.
+    pub fn is_of_size(&self, width: u32, height: u32) -> bool {
+        (self.surface.width, self.surface.height, self.surface.top) == (width as i32, height as i32, 0)
+    }
+
+    /// Makes it empty.
+    pub fn clear(&mut self) {
+        self.surface.clear();
     }
 
     /// The part of an image's rectangle (inclusive) in this band, in its own rows.
@@ -153,7 +165,8 @@ impl Band {
             rest &= rest - 1;
             let rect = [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]];
             let clear = boxes.clear >> lane & 1 == 1;
-            if node.child[lane] == Slot::EMPTY || self.rows_of(rect).is_none() {
+            let extent = (rect[2] - rect[0]).min(rect[3] - rect[1]);
+            if node.child[lane] == Slot::EMPTY || extent < standing.least_px || self.rows_of(rect).is_none() {
                 continue;
             }
             let open = Open { slot: node.child[lane], rect, depth: boxes.depth[lane], clear };
@@ -224,7 +237,13 @@ impl Band {
     fn margin_px(&self, standing: &Standing) -> Option<i32> {
         let Some((metres, pixels)) = standing.margin else { return Some(0) };
         let distance = if standing.at.perspective {
-            standing.at.d[3] / (f64::from(self.placed.nearest) * 1.000_001)
+            let near = standing.at.d[3];
+            let distance = near / (f64::from(self.placed.nearest) * 1.000_001);
+            // Nearer than that, an eye that moved towards it would have its near plane behind it.
+            if distance < near + metres {
+                return None;
+            }
+            distance
         } else {
             1.0
         };

@@ -64,6 +64,8 @@ mod queries;
 mod shared;
 mod surface;
 
+pub(super) use ask::project;
+pub(super) use draw::Band;
 pub use occluder::{Occluder, OccluderError, Sides};
 pub use queries::{Boxes, ScreenRect};
 pub use shared::SharedBuffer;
@@ -72,7 +74,7 @@ use super::Verdict;
 use crate::conventions::{Projection, View, ViewError};
 use crate::raster::ScreenFromObject;
 use ask::BoxView;
-use draw::{Band, Standing};
+use draw::Standing;
 use fearless_simd::{Level, dispatch};
 use glam::DAffine3;
 use place::Sizes;
@@ -137,7 +139,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    fn new(view: &View, options: &OcclusionOptions) -> Result<Frame, ViewError> {
+    pub(super) fn new(view: &View, options: &OcclusionOptions) -> Result<Frame, ViewError> {
         view.validate()?;
         let moves = [options.eye_moves, options.objects_move];
         if !moves.iter().all(|m| m.is_finite() && *m >= 0.0) {
@@ -165,10 +167,15 @@ impl Frame {
     }
 
     fn standing<'a>(&self, occluder: &'a Occluder, world_from_object: &DAffine3) -> Standing<'a> {
-        let at = self.screen_from_world.after(world_from_object);
+        self.standing_at(occluder, self.screen_from_world.after(world_from_object))
+    }
+
+    pub(super) fn standing_at<'a>(&self, occluder: &'a Occluder, at: ScreenFromObject) -> Standing<'a> {
         let boxes = BoxView::new(&at, self.view.width, self.view.height);
         let sizes = Sizes::new(&at, occluder.tree.bounds().reach());
-        Standing { occluder, at, boxes, sizes, margin: self.margin() }
+        // What touches two columns covers none of them; unless there are but two.
+        let least_px = 2.min(self.view.width.min(self.view.height) as i32 - 1);
+        Standing { occluder, at, boxes, sizes, margin: self.margin(), least_px }
     }
 }
 

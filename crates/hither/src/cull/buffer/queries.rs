@@ -6,6 +6,7 @@ use super::{Frame, Occluder, OcclusionBuffer, Verdict};
 use crate::conventions::Projection;
 use crate::geometry::Aabb;
 use crate::index::Box3;
+use crate::raster::ScreenFromObject;
 use fearless_simd::{Simd, dispatch};
 use glam::{DAffine3, DVec3};
 
@@ -113,12 +114,11 @@ impl OcclusionBuffer {
 }
 
 impl Frame {
-    /// Pixels beyond the image's border that an eye within the margin may come to see: all of them matter, so
-    /// what the border cuts is never hidden then.
-    fn box_view(&self) -> BoxView {
-        let mut view = BoxView::new(&self.screen_from_world, self.view.width, self.view.height);
-        if self.margin().is_some() {
-            view.ring = 1e6;
+    /// World space made ready for boxes.
+    pub(in crate::cull) fn box_view(&self, screen_from_space: &ScreenFromObject) -> BoxView {
+        let mut view = BoxView::new(screen_from_space, self.view.width, self.view.height);
+        if let Some((metres, pixels)) = self.margin() {
+            view.margin = [(metres as f32).next_up(), (pixels as f32).next_up()];
         }
         view
     }
@@ -127,6 +127,39 @@ impl Frame {
     fn widening(&self) -> f32 {
         let metres = self.options.objects_move * 2.0;
         (metres as f32).next_up() * f32::from(u8::from(metres > 0.0))
+    }
+
+    /// Boxes of a space widened by what objects may move.
+    #[inline(always)]
+    pub(in crate::cull) fn widened(
+        &self,
+        min: &[[f32; 16]; 3],
+        max: &[[f32; 16]; 3],
+        screen_from_space: &ScreenFromObject,
+    ) -> ([[f32; 16]; 3], [[f32; 16]; 3]) {
+        let metres = self.widening();
+        if metres == 0.0 {
+            return (*min, *max);
+        }
+        // The space may be a scaled one: how long its units are at least is seen from the screen's rows, which
+        // an unscaled view would leave as long as they are.
+        let shrunk = self.least_scale(screen_from_space);
+        let boxes = SixteenBoxes { min: *min, max: *max }.widened((metres / shrunk).next_up());
+        (boxes.min, boxes.max)
+    }
+
+    /// The least length in the world of a unit of a space.
+    fn least_scale(&self, screen_from_space: &ScreenFromObject) -> f32 {
+        let rows = |at: &ScreenFromObject| {
+            let depth = if at.perspective { at.w } else { at.d };
+            glam::DMat3::from_cols_array_2d(&[at.x, at.y, depth].map(|r| [r[0], r[1], r[2]])).transpose()
+        };
+        let (world, space) = (rows(&self.screen_from_world), rows(screen_from_space));
+        let world_from_space = world.inverse() * space;
+        // The inverse shrinks no more than its longest row's length says.
+        let back = world_from_space.inverse();
+        let largest = back.to_cols_array().iter().map(|c| c * c).sum::<f64>().sqrt();
+        if largest.is_finite() && largest > 0.0 { (1.0 / largest) as f32 * 0.999 } else { f32::MIN_POSITIVE }
     }
 
     pub(super) fn ask(&self, bands: &[&Band], boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
@@ -141,7 +174,7 @@ impl Frame {
 
     #[inline(always)]
     fn ask_all<S: Simd>(&self, simd: S, bands: &[&Band], boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
-        let (view, widening) = (self.box_view(), self.widening());
+        let (view, widening) = (self.box_view(&self.screen_from_world), self.widening());
         for sixteen in &boxes.sixteen {
             let on_screen = if widening > 0.0 {
                 let wide = sixteen.widened(widening);
@@ -154,7 +187,7 @@ impl Frame {
             while rest != 0 {
                 let lane = rest.trailing_zeros() as usize;
                 rest &= rest - 1;
-                out[lane] = verdict_of(simd, bands, &on_screen, lane, view.ring > 0.0);
+                out[lane] = verdict_of(simd, bands, &on_screen, lane, view.margin[0] > 0.0);
             }
             verdicts.extend(out);
         }

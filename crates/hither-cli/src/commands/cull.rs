@@ -1,0 +1,236 @@
+//! `hither cull`: which instances could be seen.
+
+use super::report::{self, Seen};
+use crate::console::{self, Verbosity};
+use crate::eye::Eye;
+use crate::failure::Failure;
+use crate::numbers::{count, grouped, short};
+use crate::options::{self, ReportOptions, ViewOptions};
+use crate::outputs;
+use crate::source;
+use crate::timeline::Timeline;
+use clap::ValueEnum;
+use hither::conventions::View;
+use hither::cull::{CullCounters, CullOptions, Culler, Reason};
+use hither::{IndexOptions, RenderOptions, Renderer, SceneIndex};
+use serde_json::{Map, Value, json};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Which instances could be seen, front to back
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// A .glb, .gltf, .obj, .stl or .ply file, or a generated world, as in `world:office?n=33`
+    scene: String,
+    /// How it is found out
+    #[arg(long, value_name = "NAME", default_value = "buffer")]
+    method: MethodName,
+    /// How far the eye may move while the answer stays true, in metres (method buffer)
+    #[arg(long, value_name = "METRES", value_parser = metres, default_value = "0", allow_hyphen_values = true)]
+    margin: f64,
+    /// Start each frame with what hid something in the last (method buffer)
+    #[arg(long)]
+    coherence: bool,
+    /// Also say of each instance why it was judged as it was (method buffer)
+    #[arg(long)]
+    reasons: bool,
+    #[command(flatten)]
+    view: ViewOptions,
+    #[command(flatten)]
+    report: ReportOptions,
+}
+
+/// `--method`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    /// Conservative occlusion buffer: what is left out cannot be seen
+    Buffer,
+    /// What is nearest at some pixel centre: what is left out may be seen between centres
+    Exact,
+}
+
+/// What a method found in one frame.
+struct Found {
+    visible: Vec<u32>,
+    reasons: Option<Value>,
+    counters: Value,
+    time: Duration,
+}
+
+/// Culls the frames that are asked for.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    check(arguments)?;
+    let verbosity = arguments.report.verbosity();
+    let to = arguments.report.json.as_deref();
+    outputs::check_report(to)?;
+    let mut scene = source::open(&arguments.scene, verbosity)?;
+    let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
+    timeline.pose_first(&mut scene);
+    let eye = Eye::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
+    let spinner = verbosity.spinner("indexing".into());
+    let mut index = SceneIndex::build(scene, &IndexOptions::default());
+    let mut method = Method::new(arguments, &index);
+    spinner.finish_and_clear();
+
+    let mut frames = Vec::new();
+    let bar = verbosity.bar(timeline.frames.len() as u64, "frames");
+    for number in timeline.frames.clone() {
+        timeline.pose(&mut index, number);
+        let view = eye.view(index.scene(), arguments.view.size);
+        let found = method.find(&index, &view)?;
+        bar.suspend(|| say(&index, &found, number, to, verbosity))?;
+        bar.inc(1);
+        if to.is_some() {
+            frames.push(frame_json(&index, &found, number, timeline.time(number), &view));
+        }
+    }
+    bar.finish_and_clear();
+    let mut json = report::opening("cull");
+    json.extend(settings(arguments, &eye, &index));
+    json.insert("frames".into(), frames.into());
+    outputs::write_report(to, &json.into())
+}
+
+fn check(arguments: &Arguments) -> Result<(), Failure> {
+    let buffer = arguments.method == MethodName::Buffer;
+    if !buffer && (arguments.margin > 0.0 || arguments.reasons || arguments.coherence) {
+        return Err(Failure::usage("--margin, --reasons and --coherence go with --method buffer"));
+    }
+    Ok(())
+}
+
+/// A method with what it keeps from frame to frame.
+enum Method {
+    Buffer(Box<Culler>, CullOptions),
+    Exact(Box<Renderer>),
+}
+
+impl Method {
+    fn new(arguments: &Arguments, index: &SceneIndex) -> Method {
+        match arguments.method {
+            MethodName::Exact => Method::Exact(Box::default()),
+            MethodName::Buffer => {
+                let mut culler = Box::new(Culler::new());
+                culler.prepare(index);
+                let options = CullOptions {
+                    eye_moves: arguments.margin,
+                    coherence: arguments.coherence,
+                    reasons: arguments.reasons,
+                    ..CullOptions::default()
+                };
+                Method::Buffer(culler, options)
+            }
+        }
+    }
+
+    fn find(&mut self, index: &SceneIndex, view: &View) -> Result<Found, Failure> {
+        let start = Instant::now();
+        match self {
+            Method::Buffer(culler, options) => {
+                let found = culler.cull(index, view, options).map_err(|e| Failure::work(e.to_string()))?;
+                let time = start.elapsed();
+                let reasons = options.reasons.then(|| {
+                    let entry = |j: &hither::cull::Judged| {
+                        json!({ "first": j.instances.start, "count": j.instances.len(), "reason": word(j.reason) })
+                    };
+                    found.judged.iter().map(entry).collect::<Vec<_>>().into()
+                });
+                Ok(Found { visible: found.visible, reasons, counters: counters(&found.counters), time })
+            }
+            Method::Exact(renderer) => {
+                let frame = renderer
+                    .render(index, view, &RenderOptions::default())
+                    .map_err(|e| Failure::work(e.to_string()))?;
+                let time = start.elapsed();
+                let visible = Seen::instances_of(&frame);
+                let counters = report::counters(&frame.counters);
+                renderer.recycle(frame);
+                Ok(Found { visible, reasons: None, counters, time })
+            }
+        }
+    }
+}
+
+fn say(
+    index: &SceneIndex,
+    found: &Found,
+    number: u32,
+    to: Option<&Path>,
+    verbosity: Verbosity,
+) -> Result<(), Failure> {
+    let all = index.scene().instance_count();
+    let time = short(found.time.as_secs_f64() * 1e3);
+    let seen = grouped(found.visible.len() as u64);
+    let line = format!("frame {number}: {seen} of {} could be seen; {time} ms", count(all, "instance"));
+    match to {
+        None if verbosity != Verbosity::Quiet => console::print(&format!("{line}\n")),
+        None => Ok(()),
+        Some(_) => {
+            verbosity.detail(&line);
+            Ok(())
+        }
+    }
+}
+
+fn frame_json(index: &SceneIndex, found: &Found, number: u32, time: Option<f64>, view: &View) -> Value {
+    let scene = index.scene();
+    let named = |&i: &u32| {
+        let name = scene.instance(u64::from(i)).map(|instance| scene.path_name(&instance.path));
+        json!({ "instance": i, "name": name })
+    };
+    let mut frame = json!({
+        "frame": number,
+        "scene_time_ms": time.map(|t| t * 1e3),
+        "eye": report::point(view.eye_in_world()),
+        "time_ms": report::milliseconds(found.time),
+        "visible": found.visible.iter().map(named).collect::<Vec<_>>(),
+        "counters": found.counters,
+    });
+    if let (Some(reasons), Some(frame)) = (&found.reasons, frame.as_object_mut()) {
+        frame.insert("reasons".into(), reasons.clone());
+    }
+    frame
+}
+
+fn settings(arguments: &Arguments, eye: &Eye, index: &SceneIndex) -> Map<String, Value> {
+    let scene = index.scene();
+    let camera = eye.camera_name(scene).map(|(i, name)| json!({ "index": i, "name": name }));
+    let mut map = Map::new();
+    map.insert("scene".into(), arguments.scene.clone().into());
+    map.insert("triangles".into(), scene.instanced_triangle_count().into());
+    map.insert("instances".into(), scene.instance_count().into());
+    map.insert("width".into(), arguments.view.size.0.into());
+    map.insert("height".into(), arguments.view.size.1.into());
+    map.insert("camera".into(), camera.into());
+    map.insert("method".into(), options::word(arguments.method).into());
+    map.insert("margin".into(), arguments.margin.into());
+    map
+}
+
+fn counters(c: &CullCounters) -> Value {
+    json!({
+        "boxes_projected": c.boxes_projected,
+        "boxes_asked": c.boxes_asked,
+        "boxes_hidden": c.boxes_hidden,
+        "occluders": c.occluders,
+        "occluder_patches": c.occluder_patches,
+        "occluder_faces": c.occluder_faces,
+        "second_thoughts": c.second_thoughts,
+    })
+}
+
+fn word(reason: Reason) -> &'static str {
+    match reason {
+        Reason::Shows => "shows",
+        Reason::ReachesNearPlane => "reaches-near-plane",
+        Reason::OutsideView => "outside-view",
+        Reason::BoxHidden => "box-hidden",
+        Reason::PartsHidden => "parts-hidden",
+        Reason::HiddenAfterAll => "hidden-after-all",
+    }
+}
+
+fn metres(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok().filter(|m| m.is_finite() && *m >= 0.0);
+    number.ok_or_else(|| "write metres, 0 or more".into())
+}

@@ -1,0 +1,226 @@
+//! Culling a scene: which instances may be seen, front to back.
+//!
+//! ```text
+//! draw what hid something last time, largest first
+//! walk the index nearest first:
+//!     a box that the buffer hides, or that is outside: drop it, with all that is in it
+//!     an instance: if one of the boxes of its mesh's tree shows, it may be seen;
+//!                  if it is large enough, draw its opaque surfaces at once, so that they hide what is behind
+//! ask once more about all that may be seen, now that everything is drawn
+//! ```
+//!
+//! *Occluders* are chosen by size on the screen: an instance is drawn if its box covers so many pixels, and of
+//! its surface the pieces that are large enough. Masked and transparent surfaces never hide. Nothing is kept of
+//! where an occluder is, so one that moves or is switched off costs nothing but its place in the index.
+//!
+//! The verdicts are those of the conservative buffer: an instance that is left out shows at no point of the
+//! continuous image.
+
+mod walk;
+
+use super::buffer::{Band, Frame, Occluder, OcclusionOptions};
+use crate::conventions::{View, ViewError};
+use crate::index::SceneIndex;
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+
+/// What may be chosen about culling a scene.
+#[derive(Clone, Copy, Debug)]
+pub struct CullOptions {
+    /// How far the eye may move, metres, while the answer is to stay true. It must not turn.
+    pub eye_moves: f64,
+    /// How far each object may move, metres, while the answer is to stay true.
+    pub objects_move: f64,
+    /// Instances whose boxes cover fewer pixels than this are not drawn as occluders. Smaller hides more, and
+    /// costs more.
+    pub least_occluder_px: u32,
+    /// Connected pieces of an occluder that touch fewer pixels across or down are left out.
+    pub least_piece_px: u32,
+    /// Boxes of a mesh's own tree that are asked about before an instance counts as visible.
+    pub boxes_an_instance: u32,
+    /// Start by drawing what hid something in this culler's last frame of the same view number.
+    pub coherence: bool,
+    /// Also say of every instance why it was judged as it was; slower.
+    pub reasons: bool,
+    /// Instruction set; the best that the machine has by default. Answers do not depend on it.
+    pub level: Level,
+}
+
+impl Default for CullOptions {
+    fn default() -> Self {
+        CullOptions {
+            eye_moves: 0.0,
+            objects_move: 0.0,
+            least_occluder_px: 400,
+            least_piece_px: 6,
+            boxes_an_instance: 256,
+            coherence: false,
+            reasons: false,
+            level: Level::new(),
+        }
+    }
+}
+
+/// Why an instance, or several with consecutive numbers, were judged as they were.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Reason {
+    /// A box of it shows between the occluders.
+    Shows,
+    /// It reaches the near plane.
+    ReachesNearPlane,
+    /// Nothing of it is before the near plane and inside the picture's sides.
+    OutsideView,
+    /// Occluders hide a box around it, or around the group that it is in.
+    BoxHidden,
+    /// Its box shows, but occluders hide each of the smaller boxes around its surface.
+    PartsHidden,
+    /// It was taken for visible, and was found hidden when everything was drawn.
+    HiddenAfterAll,
+}
+
+/// Instances with consecutive numbers, and why they were judged as they were.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Judged {
+    /// Their numbers.
+    pub instances: std::ops::Range<u32>,
+    /// Why.
+    pub reason: Reason,
+}
+
+/// What culling did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CullCounters {
+    /// Boxes of trees that were projected.
+    pub boxes_projected: u64,
+    /// Boxes that were asked about.
+    pub boxes_asked: u64,
+    /// Of these, hidden.
+    pub boxes_hidden: u64,
+    /// Instances drawn as occluders.
+    pub occluders: u64,
+    /// Connected pieces of these that were drawn.
+    pub occluder_patches: u64,
+    /// Faces of these.
+    pub occluder_faces: u64,
+    /// Instances taken for visible at first and found hidden at the end.
+    pub second_thoughts: u64,
+}
+
+/// What may be seen of a scene from one eye.
+#[derive(Clone, Debug, Default)]
+pub struct Culling {
+    /// Numbers of the instances that may be seen, nearest first.
+    pub visible: Vec<u32>,
+    /// Why, for all instances, in no particular order; empty unless asked for.
+    pub judged: Vec<Judged>,
+    /// What was done.
+    pub counters: CullCounters,
+}
+
+/// Culls frames and keeps what is worth keeping between them: occluders, buffers, and what hid something last.
+#[derive(Debug, Default)]
+pub struct Culler {
+    /// Which index the occluders are of.
+    serial: Option<u64>,
+    occluders: Vec<Occluder>,
+    views: Vec<OneView>,
+}
+
+/// What is kept for one of several views.
+#[derive(Debug, Default)]
+struct OneView {
+    band: Option<Band>,
+    /// Instances drawn as occluders, with the pixels that they covered.
+    hid: Vec<(u32, u32)>,
+}
+
+impl Culler {
+    /// A culler that knows nothing yet.
+    pub fn new() -> Culler {
+        Culler::default()
+    }
+
+    /// Makes the meshes of `index` ready to hide. [`Culler::cull`] does so by itself when it meets an index for
+    /// the first time. Cost: n log n in stored triangles.
+    pub fn prepare(&mut self, index: &SceneIndex) {
+        if self.serial != Some(index.serial) {
+            let scene = index.scene();
+            self.occluders =
+                scene.meshes.par_iter().map(|mesh| Occluder::of_mesh(mesh, &scene.materials)).collect();
+            self.serial = Some(index.serial);
+            self.views.clear();
+        }
+    }
+
+    /// Which instances may be seen in `view`.
+    pub fn cull(
+        &mut self,
+        index: &SceneIndex,
+        view: &View,
+        options: &CullOptions,
+    ) -> Result<Culling, ViewError> {
+        let all = self.cull_views(index, std::slice::from_ref(view), options)?;
+        Ok(all.into_iter().next().unwrap_or_default())
+    }
+
+    /// Which instances may be seen in each of several views: the cascades of a shadow, the faces of a cube, two
+    /// eyes. They are culled at once, on as many threads as rayon has.
+    pub fn cull_views(
+        &mut self,
+        index: &SceneIndex,
+        views: &[View],
+        options: &CullOptions,
+    ) -> Result<Vec<Culling>, ViewError> {
+        let choice = OcclusionOptions {
+            eye_moves: options.eye_moves,
+            objects_move: options.objects_move,
+            level: options.level,
+        };
+        let frames: Vec<Frame> =
+            views.iter().map(|view| Frame::new(view, &choice)).collect::<Result<_, _>>()?;
+        self.prepare(index);
+        self.views.resize_with(views.len(), OneView::default);
+        let occluders = &self.occluders;
+        let one = |(kept, frame): (&mut OneView, &Frame)| kept.cull(index, occluders, frame, options);
+        Ok(match views.len() {
+            1 => self.views.iter_mut().zip(&frames).map(one).collect(),
+            _ => self.views.par_iter_mut().zip(&frames).map(one).collect(),
+        })
+    }
+}
+
+impl OneView {
+    fn cull(
+        &mut self,
+        index: &SceneIndex,
+        occluders: &[Occluder],
+        frame: &Frame,
+        options: &CullOptions,
+    ) -> Culling {
+        let (width, height) = (frame.view.width, frame.view.height);
+        let mut band = match self.band.take() {
+            Some(mut band) if band.is_of_size(width, height) => {
+                band.clear();
+                band
+            }
+            _ => Band::new(width, 0, height),
+        };
+        let before = if options.coherence { std::mem::take(&mut self.hid) } else { Vec::new() };
+        self.hid.clear();
+        let culling = dispatch!(options.level, simd => {
+            walk::cull(simd, index, occluders, frame, options, &mut band, &before, &mut self.hid)
+        });
+        self.hid.sort_unstable_by_key(|&(instance, pixels)| (std::cmp::Reverse(pixels), instance));
+        self.band = Some(band);
+        culling
+    }
+}
+
+/// Which instances of `index` may be seen in `view`, from scratch. [`Culler`] is for more than one frame: making
+/// occluders ready costs more than culling with them.
+pub fn cull(index: &SceneIndex, view: &View, options: &CullOptions) -> Result<Culling, ViewError> {
+    Culler::new().cull(index, view, options)
+}
+
+#[cfg(test)]
+mod tests;

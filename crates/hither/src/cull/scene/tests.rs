@@ -1,0 +1,106 @@
+//! Whole scenes: nothing that shows is left out, whatever the options say.
+
+use super::*;
+use crate::conventions::Projection;
+use crate::index::IndexOptions;
+use crate::reference::trouble;
+use crate::reference::zbuffer;
+use std::collections::HashSet;
+
+/// Instances that show at a pixel centre, by the textbook z-buffer at several times the resolution. A masked
+/// or opaque surface counts.
+fn shown(index: &SceneIndex, view: &View) -> HashSet<u32> {
+    let fine = View { width: view.width * 3, height: view.height * 3, ..*view };
+    let picture = zbuffer::draw(index.scene(), &fine);
+    (0..fine.height)
+        .flat_map(|y| (0..fine.width).map(move |x| (x, y)))
+        .filter_map(|(x, y)| picture.seen(x, y))
+        .map(|(id, _)| id.instance)
+        .collect()
+}
+
+#[test]
+fn what_shows_is_never_left_out() {
+    let mut culler = Culler::new();
+    let (mut left_out, mut total) = (0, 0);
+    for seed in 0..300 {
+        let index = SceneIndex::build(trouble::scene(seed), &IndexOptions::default());
+        let view = trouble::view(seed);
+        let shown = shown(&index, &view);
+        for (coherence, least) in [(false, 0), (true, 0), (true, 400)] {
+            let options = CullOptions {
+                coherence,
+                least_occluder_px: least,
+                least_piece_px: least / 100,
+                reasons: true,
+                ..CullOptions::default()
+            };
+            let found = culler.cull(&index, &view, &options).unwrap();
+            let visible: HashSet<u32> = found.visible.iter().copied().collect();
+            assert_eq!(visible.len(), found.visible.len(), "seed {seed}: an instance twice");
+            assert!(shown.is_subset(&visible), "seed {seed}: {shown:?} show, {visible:?} were found");
+            left_out += index.scene().instance_count() as usize - visible.len();
+            total += index.scene().instance_count() as usize;
+            every_instance_is_judged_once(&index, &found);
+        }
+    }
+    assert!(left_out > 100, "{left_out} of {total} left out");
+}
+
+fn every_instance_is_judged_once(index: &SceneIndex, found: &Culling) {
+    let mut times = vec![0; index.scene().instance_count() as usize];
+    for judged in &found.judged {
+        judged.instances.clone().for_each(|i| times[i as usize] += 1);
+        for i in judged.instances.clone() {
+            let visible = matches!(judged.reason, Reason::Shows | Reason::ReachesNearPlane);
+            assert_eq!(visible, found.visible.contains(&i), "instance {i}: {:?}", judged.reason);
+        }
+    }
+    // Nothing is said of an instance of a mesh without triangles.
+    assert!(times.iter().all(|&t| t <= 1), "{times:?}");
+}
+
+#[test]
+fn several_views_at_once_are_what_they_are_one_by_one() {
+    let index = SceneIndex::build(trouble::scene(7), &IndexOptions::default());
+    let views: Vec<View> = (0..6).map(trouble::view).collect();
+    let options = CullOptions::default();
+    let together = Culler::new().cull_views(&index, &views, &options).unwrap();
+    for (view, found) in views.iter().zip(&together) {
+        assert_eq!(found.visible, cull(&index, view, &options).unwrap().visible);
+    }
+    let wrong = View { width: 0, ..views[0] };
+    assert!(cull(&index, &wrong, &options).is_err());
+}
+
+#[test]
+fn within_the_margin_a_moved_eye_sees_nothing_that_was_left_out() {
+    let random = &mut trouble::Random::new(11);
+    let mut left_out = 0;
+    for seed in 0..150 {
+        let index = SceneIndex::build(trouble::scene(seed), &IndexOptions::default());
+        let view = View { width: 64, height: 48, ..trouble::view(seed) };
+        if matches!(view.projection, Projection::Perspective { fov_y, .. } if fov_y > 2.0) {
+            continue;
+        }
+        let r = [0.01, 0.05, 0.2][random.below(3) as usize];
+        let options =
+            CullOptions { eye_moves: r, least_occluder_px: 0, least_piece_px: 0, ..CullOptions::default() };
+        let found = cull(&index, &view, &options).unwrap();
+        let visible: HashSet<u32> = found.visible.iter().copied().collect();
+        left_out += index.scene().instance_count() as usize - visible.len();
+        for _ in 0..6 {
+            let mut direction = || random.between(-1.0, 1.0);
+            let step =
+                glam::DVec3::new(direction(), direction(), direction()).normalize_or_zero() * r * 0.999;
+            let mut moved = view;
+            moved.view_from_world.translation -= step;
+            let shown = shown(&index, &moved);
+            assert!(
+                shown.is_subset(&visible),
+                "seed {seed}, step {step}: {shown:?} show, {visible:?} were found"
+            );
+        }
+    }
+    assert!(left_out > 20, "{left_out}");
+}
