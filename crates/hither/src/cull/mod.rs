@@ -9,8 +9,8 @@ mod buffer;
 mod scene;
 
 pub use buffer::{
-    Boxes, CannotMerge, Drawn, Occluder, OccluderError, OcclusionBuffer, OcclusionOptions, ScreenRect,
-    SharedBuffer, Sides,
+    Boxes, CannotMerge, Drawn, Occluder, OccluderError, OcclusionBuffer, OcclusionOptions, SampledBuffer,
+    ScreenRect, SharedBuffer, Sides,
 };
 pub use scene::{CullCounters, CullOptions, Culler, Culling, Judged, Reason, cull};
 

@@ -14,7 +14,7 @@
 //! `e = ⌊(E + bias) / 256⌋ = A·px + B·py + C` is a whole number with whole steps, and `e ≥ 0` is the fill
 //! rule exactly. A pixel's square, widened by the slack, reaches `h = (|A| + |B|)·(128 + slack)` from there.
 
-use super::surface::{Surface, TilePlane};
+use super::surface::{Row, Surface, TilePlane};
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
 /// A corner on the screen: 1/256 pixel, and a depth that is no larger than the true one.
@@ -36,28 +36,34 @@ pub(super) struct Outline {
     pub ends: u32,
 }
 
+/// Sixteen counts: a cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Counts([i32; 16]);
+
 /// What a patch covers jointly, pixel by pixel, until it is finished.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Joint {
+    /// Rows of sixteen pixels in a row of the image. A load that only partly meets a store still under way
+    /// waits for it, so all rows of sixteen begin where tiles do.
     stride: usize,
     /// Least depth of the faces that touch a pixel.
-    depth: Vec<f32>,
+    depth: Vec<Row>,
     /// How often the faces cover its centre, less what may be lost on the way to its other points.
-    count: Vec<i32>,
+    count: Vec<Counts>,
     is_dirty: Vec<bool>,
     dirty: Vec<u32>,
 }
 
 impl Joint {
     pub fn new(surface: &Surface) -> Joint {
-        // Rows of sixteen may begin at any pixel of the last tile.
-        let stride = surface.tiles_x() as usize * 16 + 16;
-        let pixels = stride * (surface.tiles_y() as usize * 16);
+        let stride = surface.tiles_x() as usize;
+        let rows = stride * (surface.tiles_y() as usize * 16);
         let tiles = (surface.tiles_x() * surface.tiles_y()) as usize;
         Joint {
             stride,
-            depth: vec![f32::INFINITY; pixels],
-            count: vec![0; pixels],
+            depth: vec![Row([f32::INFINITY; 16]); rows],
+            count: vec![Counts([0; 16]); rows],
             is_dirty: vec![false; tiles],
             dirty: Vec::new(),
         }
@@ -82,19 +88,19 @@ impl Joint {
             let (x, y) = surface.corner(tile);
             let mut wrote = false;
             for row in 0..16 {
-                let at = (y + row) as usize * self.stride + x as usize;
-                let count = i32x16::from_slice(simd, &self.count[at..at + 16]);
+                let at = (y + row) as usize * self.stride + (x >> 4) as usize;
+                let count = i32x16::from_slice(simd, &self.count[at].0);
                 let whole = count.simd_ge(one);
                 if gains && whole.any_true() {
                     if !wrote {
                         surface.open(simd, tile);
                         wrote = true;
                     }
-                    let depth = f32x16::from_slice(simd, &self.depth[at..at + 16]);
+                    let depth = f32x16::from_slice(simd, &self.depth[at].0);
                     surface.raise(simd, tile, row, depth, whole);
                 }
-                i32x16::splat(simd, 0).store_slice(&mut self.count[at..at + 16]);
-                f32x16::splat(simd, f32::INFINITY).store_slice(&mut self.depth[at..at + 16]);
+                i32x16::splat(simd, 0).store_slice(&mut self.count[at].0);
+                f32x16::splat(simd, f32::INFINITY).store_slice(&mut self.depth[at].0);
             }
             if wrote {
                 surface.raised(tile, nearest);
@@ -116,9 +122,11 @@ impl Joint {
         let (width, height) = ((right - left) as usize, (bottom - top) as usize);
         let mut depths = Vec::with_capacity(width * height);
         for y in top..bottom {
-            let at = y as usize * self.stride + left as usize;
-            let mut row: Vec<f32> =
-                (at..at + width).map(|i| if self.count[i] >= 1 { self.depth[i] } else { 0.0 }).collect();
+            let first = y as usize * self.stride;
+            let mut row: Vec<f32> = (left as usize..right as usize)
+                .map(|x| (first + x / 16, x % 16))
+                .map(|(at, c)| if self.count[at].0[c] >= 1 { self.depth[at].0[c] } else { 0.0 })
+                .collect();
             erode(&mut row, 1, radius as usize);
             depths.extend(row);
         }
@@ -129,9 +137,9 @@ impl Joint {
             let (x, y) = surface.corner(tile);
             surface.open(simd, tile);
             for row in 0..16 {
-                let at = (y + row) as usize * self.stride + x as usize;
-                self.count[at..at + 16].fill(0);
-                self.depth[at..at + 16].fill(f32::INFINITY);
+                let at = (y + row) as usize * self.stride + (x >> 4) as usize;
+                self.count[at] = Counts([0; 16]);
+                self.depth[at] = Row([f32::INFINITY; 16]);
                 if y + row < bottom {
                     let mut depth = [0.0; 16];
                     let columns = (right - x).min(16) as usize;
@@ -281,7 +289,7 @@ impl<'a> Face<'a> {
         Edge { a, b, c: e >> 8, inside, touch, ends: self.outline.ends >> k & 1 == 1 }
     }
 
-    /// Edge k of a face of at most sixteen pixels each way, and e at a pixel beside it: 32 bits hold all.
+    /// Edge k of a face of at most sixteen pixels each way, and e at a pixel in or beside it: 32 bits hold all.
     #[inline(always)]
     fn edge_nearby(&self, k: usize, x: i32, y: i32) -> (Edge, i32) {
         let (p, q) = self.ends_of_edge(k);
@@ -411,23 +419,24 @@ fn fill_small<S: Simd, const N: usize>(simd: S, surface: &Surface, joint: &mut J
     let [left, top, right, bottom] = face.around;
     let (x0, y0) = (left.max(0), top.max(0));
     let (x1, y1) = (right.min(surface.width - 1), bottom.min(surface.height - 1));
-    for tile_y in y0 >> 4..=y1 >> 4 {
-        for tile_x in x0 >> 4..=x1 >> 4 {
+    let numbers = [0, 1, 2, 3];
+    for tile_x in x0 >> 4..=x1 >> 4 {
+        for tile_y in y0 >> 4..=y1 >> 4 {
             joint.mark(surface.tile(tile_x, tile_y));
         }
+        let x = tile_x * 16;
+        let mut first = [0; N];
+        let mut edges = [Edge::default(); N];
+        for k in 0..N {
+            (edges[k], first[k]) = face.edge_nearby(k, x, y0);
+        }
+        let plane = face.tile_plane(x, top);
+        let place = Place { x, rows: [y0, y1], columns: column_bits(x0 - x, x1 - x), plane_top: top };
+        into_joint::<S, N>(simd, joint, face, &edges, first, numbers, place, plane);
     }
-    let mut first = [0; N];
-    let mut edges = [Edge::default(); N];
-    for k in 0..N {
-        (edges[k], first[k]) = face.edge_nearby(k, x0, y0);
-    }
-    let numbers = [0, 1, 2, 3];
-    let plane = face.tile_plane(x0, top);
-    let place = Place { x: x0, rows: [y0, y1], columns: column_bits(0, x1 - x0), plane_top: top };
-    into_joint::<S, N>(simd, joint, face, &edges, first, numbers, place, plane);
 }
 
-/// Up to sixteen columns, and some rows of them.
+/// A tile's columns, some of them, and some rows.
 #[derive(Clone, Copy)]
 struct Place {
     x: i32,
@@ -475,12 +484,12 @@ fn into_joint<S: Simd, const N: usize>(
             touch |= e[k] + touch_by[k];
         }
         let touched = touch.simd_ge(zero) & columns;
-        let at = y as usize * joint.stride + place.x as usize;
-        let depths = &mut joint.depth[at..at + 16];
+        let at = y as usize * joint.stride + (place.x >> 4) as usize;
+        let depths = &mut joint.depth[at].0;
         let old = f32x16::from_slice(simd, depths);
         let depth = plane.row(simd, y - place.plane_top).max(farthest);
         touched.select(old.min(depth), old).store_slice(depths);
-        let counts = &mut joint.count[at..at + 16];
+        let counts = &mut joint.count[at].0;
         let covered = centre.simd_ge(zero) & columns;
         let mut count = i32x16::from_slice(simd, counts);
         count += covered.select(one, zero);

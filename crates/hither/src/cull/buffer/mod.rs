@@ -61,6 +61,7 @@ mod fill;
 mod occluder;
 mod place;
 mod queries;
+mod sampled;
 mod shared;
 mod surface;
 
@@ -68,6 +69,7 @@ pub(super) use ask::project;
 pub(super) use draw::Band;
 pub use occluder::{Occluder, OccluderError, Sides};
 pub use queries::{Boxes, ScreenRect};
+pub use sampled::SampledBuffer;
 pub use shared::SharedBuffer;
 
 use super::Verdict;

@@ -47,7 +47,7 @@ pub struct Occluder {
     pub(super) faces: Vec<Face>,
     pub(super) patches: Vec<Patch>,
     pub(super) tree: WideTree,
-    pub(super) triangles: usize,
+    triangles: usize,
 }
 
 /// Positions, patch by patch, each patch filled up to a multiple of eight.
@@ -110,6 +110,21 @@ impl Occluder {
         let triangles =
             runs.flat_map(|(range, two_sided)| range.map(move |t| (mesh.triangles[t as usize], two_sided)));
         prepare(&mesh.positions, triangles)
+    }
+
+    /// Its triangles, whether both sides hide.
+    pub(super) fn triangles(&self) -> impl Iterator<Item = ([[f32; 3]; 3], bool)> + '_ {
+        let v = &self.vertices;
+        let point = |i: usize| [v.x[i], v.y[i], v.z[i]];
+        self.patches.iter().flat_map(move |patch| {
+            let first = patch.first_vertex as usize;
+            let faces = &self.faces[patch.first_face as usize..][..patch.faces as usize];
+            faces.iter().flat_map(move |face| {
+                let c = face.corner.map(|v| point(first + v as usize));
+                let second = (face.corners == 4).then_some([c[0], c[2], c[3]]);
+                [Some([c[0], c[1], c[2]]), second].into_iter().flatten().map(|t| (t, face.two_sided))
+            })
+        })
     }
 
     /// How many triangles it was made of, those that can hide nothing left out.

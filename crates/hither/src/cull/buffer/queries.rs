@@ -49,6 +49,20 @@ impl Boxes {
         self.len
     }
 
+    /// Largest magnitudes of the coordinates of those that are boxes.
+    pub(super) fn reach(&self) -> [f64; 3] {
+        let mut reach = [0.0f32; 3];
+        for sixteen in &self.sixteen {
+            for lane in (0..16).filter(|&lane| sixteen.is_box(lane)) {
+                for axis in 0..3 {
+                    let (low, high) = (sixteen.min[axis][lane], sixteen.max[axis][lane]);
+                    reach[axis] = reach[axis].max(low.abs()).max(high.abs());
+                }
+            }
+        }
+        reach.map(f64::from)
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.len == 0
@@ -337,6 +351,14 @@ fn verdict_of<S: Simd>(
 }
 
 impl SixteenBoxes {
+    /// Whether a lane's corners are in order and not too far away.
+    pub fn is_box(&self, lane: usize) -> bool {
+        (0..3).all(|axis| {
+            let (low, high) = (self.min[axis][lane], self.max[axis][lane]);
+            low <= high && low >= -1e15 && high <= 1e15
+        })
+    }
+
     fn widened(&self, by: f32) -> SixteenBoxes {
         SixteenBoxes {
             min: self.min.map(|axis| axis.map(|v| (v - by).next_down())),

@@ -268,3 +268,209 @@ fn points_are_out_of_sight(
         );
     }
 }
+
+/// One box seen from the front: it fills the image's middle.
+fn wall() -> (Occluder, View) {
+    let corner =
+        |k: u32| Vec3::new((k & 1) as f32 - 0.5, (k >> 1 & 1) as f32 - 0.5, (k >> 2 & 1) as f32 - 0.5);
+    let quads = [[0u32, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles: Vec<[u32; 3]> =
+        quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
+    let positions: Vec<Vec3> = (0..8).map(corner).collect();
+    let lens = Projection::Perspective { fov_y: 1.0, near: 0.1 };
+    let view = View::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, lens, (160, 120));
+    (Occluder::new(&positions, &triangles, Sides::Front).unwrap(), view)
+}
+
+fn cube_at(center: DVec3, half: f64) -> Aabb {
+    Aabb { min: center - half, max: center + half }
+}
+
+#[test]
+fn boxes_that_are_none_are_never_hidden() {
+    let (wall, view) = wall();
+    let mut buffer = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
+    buffer.draw(&wall, &DAffine3::from_scale(DVec3::new(50.0, 50.0, 1.0)));
+    let mut sampled = SampledBuffer::new(&view).unwrap();
+    sampled.draw(&wall, &DAffine3::from_scale(DVec3::new(50.0, 50.0, 1.0)));
+    let behind = cube_at(DVec3::NEG_Z * 10.0, 1.0);
+    assert_eq!(buffer.ask_box(&behind), Verdict::Hidden);
+    assert_eq!(sampled.ask_box(&behind), Verdict::Hidden);
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
+        for axis in 0..3 {
+            for end in 0..2 {
+                let mut b = behind;
+                let side = if end == 0 { &mut b.min } else { &mut b.max };
+                side[axis] = bad;
+                assert_eq!(buffer.ask_box(&b), Verdict::Visible, "{b:?}");
+                assert_eq!(sampled.ask_box(&b), Verdict::Visible, "{b:?}");
+            }
+        }
+        if !bad.is_finite() {
+            assert_eq!(buffer.ask_sphere(DVec3::new(0.0, 0.0, bad), 1.0), Verdict::Visible);
+        }
+        assert_eq!(buffer.ask_sphere(DVec3::NEG_Z * 9.0, bad.abs()), Verdict::Visible);
+        let rect = ScreenRect { left: 1.0, top: 1.0, right: 2.0, bottom: 2.0, depth: bad as f32 };
+        assert!(bad == f64::NEG_INFINITY || buffer.ask_rect(&rect) == Verdict::Visible);
+    }
+    assert_eq!(buffer.ask_box(&Aabb::EMPTY), Verdict::Visible);
+    // Around the eye, behind it, beside the view.
+    assert_eq!(buffer.ask_box(&cube_at(DVec3::Z * 5.0, 1.0)), Verdict::Visible);
+    assert_eq!(buffer.ask_box(&cube_at(DVec3::Z * 9.0, 1.0)), Verdict::Outside);
+    assert_eq!(buffer.ask_box(&cube_at(DVec3::X * 90.0, 1.0)), Verdict::Outside);
+    let mut verdicts = vec![Verdict::Visible];
+    buffer.ask(&Boxes::default(), &mut verdicts);
+    assert!(verdicts.is_empty());
+}
+
+#[test]
+fn balls_rectangles_and_meshes_agree_with_boxes() {
+    let (wall, view) = wall();
+    let mut buffer = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
+    buffer.draw(&wall, &DAffine3::from_scale(DVec3::new(2.0, 2.0, 0.1)));
+    let random = &mut Random::new(9);
+    let mut counts = [0; 3];
+    for _ in 0..3000 {
+        let center =
+            DVec3::new(random.between(-4.0, 4.0), random.between(-4.0, 4.0), random.between(-9.0, 6.0));
+        let half = random.between(0.01, 1.0);
+        let around = buffer.ask_box(&cube_at(center, half));
+        counts[around as usize] += 1;
+        // A ball that reaches the near plane is not looked at more closely.
+        if around != Verdict::Visible && center.z + half < 4.8 {
+            assert_ne!(buffer.ask_sphere(center, half * 0.999), Verdict::Visible, "{center} {half}");
+            let at = DAffine3::from_scale_rotation_translation(
+                DVec3::splat(half * 1.998),
+                glam::DQuat::IDENTITY,
+                center,
+            );
+            assert_ne!(buffer.ask_mesh(&wall, &at), Verdict::Visible, "{center} {half}");
+        }
+        if buffer.ask_sphere(center, half * 1.75) == Verdict::Hidden {
+            assert_eq!(around, Verdict::Hidden, "{center} {half}");
+        }
+    }
+    assert!(counts.iter().all(|&c| c > 100), "{counts:?}");
+    let middle = |depth| ScreenRect { left: 70.0, top: 50.0, right: 90.0, bottom: 70.0, depth };
+    assert_eq!(buffer.ask_rect(&middle(0.01)), Verdict::Hidden);
+    assert_eq!(buffer.ask_rect(&middle(0.5)), Verdict::Visible);
+    assert_eq!(buffer.ask_rect(&ScreenRect { left: 161.0, right: 170.0, ..middle(0.5) }), Verdict::Outside);
+}
+
+#[test]
+fn merging_is_drawing_both_and_more_occluders_never_reveal() {
+    for seed in 0..60 {
+        let (scene, view) = (trouble::scene(seed + 300), trouble::view(seed + 300));
+        let occluders: Vec<Occluder> =
+            scene.meshes.iter().map(|m| Occluder::of_mesh(m, &scene.materials)).collect();
+        let empty = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
+        let (mut both, mut halves) = (empty.clone(), [empty.clone(), empty]);
+        for (i, instance) in scene.instances().iter().enumerate() {
+            let before = both.depths();
+            both.draw(&occluders[instance.mesh as usize], &instance.world_from_mesh);
+            assert!(both.depths().iter().zip(&before).all(|(now, then)| now >= then), "seed {seed}");
+            halves[i % 2].draw(&occluders[instance.mesh as usize], &instance.world_from_mesh);
+        }
+        let [mut one, other] = halves;
+        one.merge(&other).unwrap();
+        assert!(one.depths() == both.depths(), "seed {seed}");
+    }
+    let (_, view) = wall();
+    let mut small = OcclusionBuffer::new(&View { width: 10, ..view }, &OcclusionOptions::default()).unwrap();
+    assert!(small.merge(&OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap()).is_err());
+}
+
+#[test]
+fn sizes_from_one_pixel_to_the_largest() {
+    let (wall, view) = wall();
+    for (width, height) in [(1, 1), (1, 16384), (16384, 1), (16384, 16), (17, 33)] {
+        let view = View { width, height, ..view };
+        let mut buffer = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
+        buffer.draw(&wall, &DAffine3::from_scale(DVec3::new(1e5, 1e5, 1.0)));
+        assert!(buffer.depths().iter().all(|&d| d > 0.0), "{width}x{height}");
+        assert_eq!(buffer.ask_box(&cube_at(DVec3::NEG_Z * 10.0, 1.0)), Verdict::Hidden);
+        buffer.clear();
+        assert!(buffer.depths().iter().all(|&d| d == 0.0));
+    }
+    for (width, height) in [(0, 1), (1, 0), (16385, 1)] {
+        let wrong = View { width, height, ..view };
+        assert!(OcclusionBuffer::new(&wrong, &OcclusionOptions::default()).is_err());
+        assert!(SharedBuffer::new(&wrong, &OcclusionOptions::default(), 2).is_err());
+        assert!(SampledBuffer::new(&wrong).is_err());
+    }
+    let wrong = OcclusionOptions { eye_moves: f64::NAN, ..OcclusionOptions::default() };
+    assert!(OcclusionBuffer::new(&view, &wrong).is_err());
+}
+
+#[test]
+fn eyes_in_on_and_at_a_corner_of_an_occluder_are_told_the_truth() {
+    let (wall, view) = wall();
+    let random = &mut Random::new(21);
+    let mut scene = Scene::new("wall");
+    scene.materials = vec![Material::default()];
+    let mut mesh = Mesh::default();
+    for (corners, _) in wall.triangles() {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(corners.map(Vec3::from));
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+    mesh.primitives = vec![Primitive { triangles: 0..12, material: Some(0) }];
+    scene.meshes = vec![mesh];
+    scene.groups[0].push(Node { content: Content::Mesh(0), ..Node::default() });
+    for eye in
+        [DVec3::ZERO, DVec3::splat(0.5), DVec3::new(0.5, 0.1, 0.2), DVec3::new(0.5, 3.0, 0.5), DVec3::X]
+    {
+        for target in [DVec3::NEG_Z, DVec3::new(0.3, 0.2, -0.9), DVec3::Y * 0.4] {
+            let lens = Projection::Perspective { fov_y: 1.5, near: 0.01 };
+            let view = View::look_at(eye, eye + target, DVec3::X, lens, (view.width / 4, view.height / 4));
+            attack(&scene, &view, random, 4, &format!("{eye} {target}"));
+        }
+    }
+}
+
+#[test]
+fn within_the_margin_a_moved_eye_sees_no_hidden_box_however_objects_move() {
+    let (wall, view) = wall();
+    let random = &mut Random::new(31);
+    let mut hidden = 0;
+    for round in 0..60 {
+        let (r, m) = (random.between(0.0, 0.2), random.between(0.0, 0.1));
+        let options = OcclusionOptions { eye_moves: r, objects_move: m, ..OcclusionOptions::default() };
+        let mut buffer = OcclusionBuffer::new(&view, &options).unwrap();
+        let mut walls = Vec::new();
+        for _ in 0..6 {
+            let at =
+                DVec3::new(random.between(-2.0, 2.0), random.between(-1.5, 1.5), random.between(-3.0, 2.0));
+            let size =
+                DVec3::new(random.between(0.5, 3.0), random.between(0.5, 3.0), random.between(0.01, 1.0));
+            buffer.draw(&wall, &DAffine3::from_scale_rotation_translation(size, glam::DQuat::IDENTITY, at));
+            walls.push((at, size));
+        }
+        for _ in 0..400 {
+            let at =
+                DVec3::new(random.between(-4.0, 4.0), random.between(-3.0, 3.0), random.between(-8.0, 2.0));
+            if buffer.ask_box(&cube_at(at, random.between(0.0, 0.3))) != Verdict::Hidden {
+                continue;
+            }
+            hidden += 1;
+            for _ in 0..20 {
+                let mut step = |by: f64| {
+                    let mut c = || random.between(-1.0, 1.0);
+                    DVec3::new(c(), c(), c()).normalize_or_zero() * by
+                };
+                let (eye, point) = (DVec3::Z * 5.0 + step(r), at + step(m));
+                let blocked = walls.iter().any(|&(at, size)| crosses(eye, point, at + step(m), size * 0.5));
+                assert!(blocked, "round {round}: from {eye} the point {point} is seen; r = {r}, m = {m}");
+            }
+        }
+    }
+    assert!(hidden > 1000, "{hidden}");
+}
+
+/// Whether the segment from `eye` to `point` meets a box.
+fn crosses(eye: DVec3, point: DVec3, center: DVec3, half: DVec3) -> bool {
+    let way = point - eye;
+    let (a, b) = ((center - half - eye) / way, (center + half - eye) / way);
+    let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
+    enter <= leave && leave >= 0.0 && enter <= 1.0
+}
