@@ -41,116 +41,126 @@ pub(super) struct Outline {
 #[repr(align(64))]
 struct Counts([i32; 16]);
 
-/// What a patch covers jointly, pixel by pixel, until it is finished.
+/// What a patch covers jointly, pixel by pixel, until it is finished. Tiles take their room from a pool when they
+/// are first touched, so that a small patch works in the nearest cache, wherever in the image it is.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Joint {
-    /// Rows of sixteen pixels in a row of the image. A load that only partly meets a store still under way
-    /// waits for it, so all rows of sixteen begin where tiles do.
-    stride: usize,
-    /// Least depth of the faces that touch a pixel.
-    depth: Vec<Row>,
-    /// How often the faces cover its centre, less what may be lost on the way to its other points.
-    count: Vec<Counts>,
-    is_dirty: Vec<bool>,
+    /// For each tile its place in the pool, or [`NO_ROOM`].
+    place: Vec<u32>,
+    /// The tiles that have a place, in the order of their places.
     dirty: Vec<u32>,
+    pool: Vec<JointTile>,
+}
+
+const NO_ROOM: u32 = u32::MAX;
+
+#[derive(Clone, Debug)]
+struct JointTile {
+    /// Least depth of the faces that touch a pixel.
+    depth: [Row; 16],
+    /// How often the faces cover its centre, less what may be lost on the way to its other points.
+    count: [Counts; 16],
+}
+
+impl JointTile {
+    const EMPTY: JointTile =
+        JointTile { depth: [Row([f32::INFINITY; 16]); 16], count: [Counts([0; 16]); 16] };
 }
 
 impl Joint {
     pub fn new(surface: &Surface) -> Joint {
-        let stride = surface.tiles_x() as usize;
-        let rows = stride * (surface.tiles_y() as usize * 16);
         let tiles = (surface.tiles_x() * surface.tiles_y()) as usize;
-        Joint {
-            stride,
-            depth: vec![Row([f32::INFINITY; 16]); rows],
-            count: vec![Counts([0; 16]); rows],
-            is_dirty: vec![false; tiles],
-            dirty: Vec::new(),
-        }
+        Joint { place: vec![NO_ROOM; tiles], dirty: Vec::new(), pool: Vec::new() }
     }
 
+    /// A tile's room.
     #[inline(always)]
-    fn mark(&mut self, tile: usize) {
-        if !self.is_dirty[tile] {
-            self.is_dirty[tile] = true;
+    fn tile(&mut self, tile: usize) -> &mut JointTile {
+        let mut place = self.place[tile];
+        if place == NO_ROOM {
+            place = self.dirty.len() as u32;
+            self.place[tile] = place;
             self.dirty.push(tile as u32);
+            if self.pool.len() < self.dirty.len() {
+                self.pool.push(JointTile::EMPTY);
+            }
         }
+        &mut self.pool[place as usize]
     }
 
     /// Writes what the patch covers to the surface and empties the joint.
     #[inline(always)]
     pub fn finish<S: Simd>(&mut self, simd: S, surface: &mut Surface, nearest: f32) {
         let one = i32x16::splat(simd, 1);
-        while let Some(tile) = self.dirty.pop() {
-            let tile = tile as usize;
-            self.is_dirty[tile] = false;
+        for place in 0..self.dirty.len() {
+            let tile = self.dirty[place] as usize;
+            self.place[tile] = NO_ROOM;
             let gains = surface.tile_min(tile) < nearest;
-            let (x, y) = surface.corner(tile);
+            let joint = &mut self.pool[place];
             let mut wrote = false;
             for row in 0..16 {
-                let at = (y + row) as usize * self.stride + (x >> 4) as usize;
-                let count = i32x16::from_slice(simd, &self.count[at].0);
-                let whole = count.simd_ge(one);
+                let whole = i32x16::from_slice(simd, &joint.count[row].0).simd_ge(one);
                 if gains && whole.any_true() {
                     if !wrote {
                         surface.open(simd, tile);
                         wrote = true;
                     }
-                    let depth = f32x16::from_slice(simd, &self.depth[at].0);
-                    surface.raise(simd, tile, row, depth, whole);
+                    let depth = f32x16::from_slice(simd, &joint.depth[row].0);
+                    surface.raise(simd, tile, row as i32, depth, whole);
                 }
-                i32x16::splat(simd, 0).store_slice(&mut self.count[at].0);
-                f32x16::splat(simd, f32::INFINITY).store_slice(&mut self.depth[at].0);
+                i32x16::splat(simd, 0).store_slice(&mut joint.count[row].0);
+                f32x16::splat(simd, f32::INFINITY).store_slice(&mut joint.depth[row].0);
             }
             if wrote {
                 surface.raised(tile, nearest);
             }
         }
+        self.dirty.clear();
     }
 
     /// As [`Joint::finish`], but a pixel gets the least depth of all within `radius` pixels, and nothing
     /// where one of these is not covered or not in the image.
     pub fn finish_eroded<S: Simd>(&mut self, simd: S, surface: &mut Surface, nearest: f32, radius: i32) {
-        let corners = self.dirty.iter().map(|&t| surface.corner(t as usize));
-        let none = [i32::MAX, i32::MAX, 0, 0];
-        let [left, top, right, bottom] =
-            corners.fold(none, |[l, t, r, b], (x, y)| [l.min(x), t.min(y), r.max(x + 16), b.max(y + 16)]);
+        let (mut left, mut top, mut right, mut bottom) = (i32::MAX, i32::MAX, 0, 0);
+        for &tile in &self.dirty {
+            let (x, y) = surface.corner(tile as usize);
+            (left, top, right, bottom) = (left.min(x), top.min(y), right.max(x + 16), bottom.max(y + 16));
+        }
         if left >= right {
             return;
         }
-        let (right, bottom) = (right.min(surface.width), bottom.min(surface.height));
-        let (width, height) = ((right - left) as usize, (bottom - top) as usize);
-        let mut depths = Vec::with_capacity(width * height);
-        for y in top..bottom {
-            let first = y as usize * self.stride;
-            let mut row: Vec<f32> = (left as usize..right as usize)
-                .map(|x| (first + x / 16, x % 16))
-                .map(|(at, c)| if self.count[at].0[c] >= 1 { self.depth[at].0[c] } else { 0.0 })
-                .collect();
-            erode(&mut row, 1, radius as usize);
-            depths.extend(row);
+        let width = (right - left) as usize;
+        let mut depths = vec![0.0; width * (bottom - top) as usize];
+        let first_of = |(x, y): (i32, i32)| (y - top) as usize * width + (x - left) as usize;
+        for (joint, &tile) in self.pool.iter().zip(&self.dirty) {
+            let at = first_of(surface.corner(tile as usize));
+            for row in 0..16 {
+                for column in 0..16 {
+                    if joint.count[row].0[column] >= 1 {
+                        depths[at + row * width + column] = joint.depth[row].0[column];
+                    }
+                }
+            }
+        }
+        for row in depths.chunks_exact_mut(width) {
+            let mut values = row.to_vec();
+            erode(&mut values, 1, radius as usize);
+            row.copy_from_slice(&values);
         }
         erode(&mut depths, width, radius as usize);
-        for tile in self.dirty.drain(..) {
+        for (joint, &tile) in self.pool.iter_mut().zip(&self.dirty) {
+            let at = first_of(surface.corner(tile as usize));
+            *joint = JointTile::EMPTY;
             let tile = tile as usize;
-            self.is_dirty[tile] = false;
-            let (x, y) = surface.corner(tile);
+            self.place[tile] = NO_ROOM;
             surface.open(simd, tile);
             for row in 0..16 {
-                let at = (y + row) as usize * self.stride + (x >> 4) as usize;
-                self.count[at] = Counts([0; 16]);
-                self.depth[at] = Row([f32::INFINITY; 16]);
-                if y + row < bottom {
-                    let mut depth = [0.0; 16];
-                    let columns = (right - x).min(16) as usize;
-                    let from = (y + row - top) as usize * width + (x - left) as usize;
-                    depth[..columns].copy_from_slice(&depths[from..from + columns]);
-                    let depth = f32x16::from_slice(simd, &depth);
-                    surface.raise(simd, tile, row, depth, mask32x16::from_bitmask(simd, 0xFFFF));
-                }
+                let depth = f32x16::from_slice(simd, &depths[at + row * width..][..16]);
+                surface.raise(simd, tile, row as i32, depth, mask32x16::from_bitmask(simd, 0xFFFF));
             }
             surface.raised(tile, nearest);
         }
+        self.dirty.clear();
     }
 }
 
@@ -420,25 +430,31 @@ fn fill_small<S: Simd, const N: usize>(simd: S, surface: &Surface, joint: &mut J
     let (x0, y0) = (left.max(0), top.max(0));
     let (x1, y1) = (right.min(surface.width - 1), bottom.min(surface.height - 1));
     let numbers = [0, 1, 2, 3];
+    let mut at_first = [0; N];
+    let mut edges = [Edge::default(); N];
+    for k in 0..N {
+        (edges[k], at_first[k]) = face.edge_nearby(k, x0 & !15, y0);
+    }
     for tile_x in x0 >> 4..=x1 >> 4 {
-        for tile_y in y0 >> 4..=y1 >> 4 {
-            joint.mark(surface.tile(tile_x, tile_y));
-        }
         let x = tile_x * 16;
-        let mut first = [0; N];
-        let mut edges = [Edge::default(); N];
-        for k in 0..N {
-            (edges[k], first[k]) = face.edge_nearby(k, x, y0);
-        }
         let plane = face.tile_plane(x, top);
-        let place = Place { x, rows: [y0, y1], columns: column_bits(x0 - x, x1 - x), plane_top: top };
-        into_joint::<S, N>(simd, joint, face, &edges, first, numbers, place, plane);
+        for tile_y in y0 >> 4..=y1 >> 4 {
+            let rows = [y0.max(tile_y * 16), y1.min(tile_y * 16 + 15)];
+            let mut first = [0; N];
+            for k in 0..N {
+                first[k] = at_first[k] + edges[k].a * (x - (x0 & !15)) + edges[k].b * (rows[0] - y0);
+            }
+            let tile = surface.tile(tile_x, tile_y);
+            let place = Place { tile, x, rows, columns: column_bits(x0 - x, x1 - x), plane_top: top };
+            into_joint::<S, N>(simd, joint, face, &edges, first, numbers, place, plane);
+        }
     }
 }
 
 /// A tile's columns, some of them, and some rows.
 #[derive(Clone, Copy)]
 struct Place {
+    tile: usize,
     x: i32,
     rows: [i32; 2],
     columns: u64,
@@ -477,6 +493,7 @@ fn into_joint<S: Simd, const N: usize>(
     let columns = mask32x16::from_bitmask(simd, place.columns);
     let farthest = f32x16::splat(simd, face.farthest);
     let one = i32x16::splat(simd, 1);
+    let joint = joint.tile(place.tile);
     for y in place.rows[0]..=place.rows[1] {
         let (mut centre, mut touch) = (zero, zero);
         for k in 0..N {
@@ -484,12 +501,12 @@ fn into_joint<S: Simd, const N: usize>(
             touch |= e[k] + touch_by[k];
         }
         let touched = touch.simd_ge(zero) & columns;
-        let at = y as usize * joint.stride + (place.x >> 4) as usize;
-        let depths = &mut joint.depth[at].0;
+        let row = (y & 15) as usize;
+        let depths = &mut joint.depth[row].0;
         let old = f32x16::from_slice(simd, depths);
         let depth = plane.row(simd, y - place.plane_top).max(farthest);
         touched.select(old.min(depth), old).store_slice(depths);
-        let counts = &mut joint.count[at].0;
+        let counts = &mut joint.count[row].0;
         let covered = centre.simd_ge(zero) & columns;
         let mut count = i32x16::from_slice(simd, counts);
         count += covered.select(one, zero);
@@ -603,9 +620,8 @@ fn fill_tile<S: Simd, const N: usize>(
     let [left, top, right, bottom] = face.around;
     let (y0, y1) = (top.max(y), bottom.min(y + 15).min(surface.height - 1));
     if crossed.shared || jointly {
-        joint.mark(tile);
         let columns = column_bits(left - x, right - x);
-        let place = Place { x, rows: [y0, y1], columns, plane_top: y };
+        let place = Place { tile, x, rows: [y0, y1], columns, plane_top: y };
         let mut first = [0; N];
         for k in 0..N {
             first[k] = edges[k].at_saturated(x, y0);
