@@ -62,13 +62,13 @@ fn attack(scene: &Scene, view: &View, random: &mut Random, rays: u32, what: &str
 fn no_pixel_holds_more_than_is_there_in_trouble() {
     let random = &mut Random::new(1);
     let (mut covered, mut shot) = (0, 0);
-    for seed in 0..600 {
+    for seed in 0..3000 {
         let (scene, view) = (trouble::scene(seed), trouble::view(seed));
         let (c, s) = attack(&scene, &view, random, 6, &format!("seed {seed}"));
         covered += c;
         shot += s;
     }
-    assert!(covered > 20_000 && shot > 100_000, "{covered} pixels, {shot} rays");
+    assert!(covered > 100_000 && shot > 600_000, "{covered} pixels, {shot} rays");
 }
 
 /// Closed, bumpy, connected meshes of many small faces: folds, silhouettes in front of the same surface.
@@ -129,7 +129,7 @@ fn around(random: &mut Random, reach: f64, size: (u32, u32)) -> View {
 fn no_pixel_holds_more_than_is_there_on_folded_closed_surfaces() {
     let random = &mut Random::new(2);
     let (mut covered, mut shot) = (0, 0);
-    for seed in 0..400 {
+    for seed in 0..1500 {
         let scene = lumps(seed);
         let size = (1 + random.below(70), 1 + random.below(70));
         let reach = [3.0, 6.0, 20.0, 1.0][random.below(4) as usize];
@@ -138,7 +138,7 @@ fn no_pixel_holds_more_than_is_there_on_folded_closed_surfaces() {
         covered += c;
         shot += s;
     }
-    assert!(covered > 50_000 && shot > 200_000, "{covered} pixels, {shot} rays");
+    assert!(covered > 200_000 && shot > 800_000, "{covered} pixels, {shot} rays");
 }
 
 #[test]
@@ -210,11 +210,11 @@ fn some_box(random: &mut Random) -> Aabb {
 fn no_box_that_is_hidden_can_be_seen() {
     let random = &mut Random::new(4);
     let mut counts = [0u64; 3];
-    for seed in 0..400 {
+    for seed in 0..2500 {
         let (scene, view) = (trouble::scene(seed + 5000), trouble::view(seed + 5000));
         let buffer = drawn(&scene, &view, &OcclusionOptions::default());
         let sight = Sight::new(&scene, &view);
-        let bounds: Vec<Aabb> = (0..200).map(|_| some_box(random)).collect();
+        let bounds: Vec<Aabb> = (0..400).map(|_| some_box(random)).collect();
         let boxes: Boxes = bounds.iter().copied().collect();
         let mut verdicts = Vec::new();
         buffer.ask(&boxes, &mut verdicts);
@@ -225,7 +225,8 @@ fn no_box_that_is_hidden_can_be_seen() {
             }
         }
     }
-    assert!(counts.iter().all(|&c| c > 1000), "{counts:?}");
+    // A million boxes asked about.
+    assert!(counts.iter().all(|&c| c > 10_000), "{counts:?}");
 }
 
 /// Shoots at points of a box: its corners, and others.
