@@ -66,6 +66,8 @@ pub(in crate::cull) struct Standing<'a> {
     pub margin: Option<(f64, f64)>,
     /// Patches that touch fewer pixels across or down than this are not worth drawing.
     pub least_px: i32,
+    /// Patches whose boxes cover fewer pixels than this for each face are not worth drawing.
+    pub px_a_face: i32,
 }
 
 impl Band {
@@ -138,6 +140,11 @@ impl Band {
                 Child::Node(node) => self.visit(simd, standing, node),
                 Child::Leaf(patch) => {
                     let patch = &standing.occluder.patches[patch as usize];
+                    let [left, top, right, bottom] = open.rect.map(i64::from);
+                    let pixels = (right - left + 1) * (bottom - top + 1);
+                    if pixels < i64::from(patch.faces) * i64::from(standing.px_a_face) {
+                        continue;
+                    }
                     simd.vectorize(
                         #[inline(always)]
                         || self.draw_patch(simd, standing, patch, open, drawn),

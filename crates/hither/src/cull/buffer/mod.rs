@@ -177,7 +177,7 @@ impl Frame {
         let sizes = Sizes::new(&at, occluder.tree.bounds().reach());
         // What touches two columns covers none of them; unless there are but two.
         let least_px = 2.min(self.view.width.min(self.view.height) as i32 - 1);
-        Standing { occluder, at, boxes, sizes, margin: self.margin(), least_px }
+        Standing { occluder, at, boxes, sizes, margin: self.margin(), least_px, px_a_face: 0 }
     }
 }
 

@@ -36,6 +36,9 @@ pub struct CullOptions {
     pub least_occluder_px: u32,
     /// Connected pieces of an occluder that touch fewer pixels across or down are left out.
     pub least_piece_px: u32,
+    /// So are pieces whose boxes cover fewer pixels than this for each of their faces: they cost more than they
+    /// hide.
+    pub least_px_a_face: u32,
     /// Boxes of a mesh's own tree that are asked about before an instance counts as visible.
     pub boxes_an_instance: u32,
     /// Start by drawing what hid something in this culler's last frame of the same view number.
@@ -53,6 +56,7 @@ impl Default for CullOptions {
             objects_move: 0.0,
             least_occluder_px: 400,
             least_piece_px: 6,
+            least_px_a_face: 4,
             boxes_an_instance: 256,
             coherence: false,
             reasons: false,

@@ -56,6 +56,8 @@ struct Seen {
     instance: u32,
     mesh: u32,
     at: ScreenFromObject,
+    /// How many occluders had been drawn when it was judged.
+    occluders: u64,
 }
 
 struct Walk<'a> {
@@ -179,7 +181,8 @@ impl<'a> Walk<'a> {
             Shows::No(reason) => self.judge_one(instance, reason),
             Shows::Yes(reason) => {
                 self.judge_one(instance, reason);
-                self.seen.push(Seen { instance, mesh, at });
+                let occluders = self.counters.occluders;
+                self.seen.push(Seen { instance, mesh, at, occluders });
                 let [left, top, right, bottom] = open.rect;
                 let pixels = ((right - left + 1) * (bottom - top + 1)) as u32;
                 if pixels >= self.options.least_occluder_px {
@@ -198,6 +201,7 @@ impl<'a> Walk<'a> {
         }
         let mut standing = self.frame.standing_at(occluder, at);
         standing.least_px = standing.least_px.max(self.options.least_piece_px as i32);
+        standing.px_a_face = self.options.least_px_a_face as i32;
         let mut drawn = Drawn::default();
         self.band.draw(simd, &standing, &mut drawn);
         if drawn.patches > 0 {
@@ -278,6 +282,11 @@ impl<'a> Walk<'a> {
         let seen = std::mem::take(&mut self.seen);
         let mut visible = Vec::with_capacity(seen.len());
         for one in &seen {
+            // Nothing was drawn since.
+            if one.occluders == self.counters.occluders {
+                visible.push(one.instance);
+                continue;
+            }
             match self.mesh_shows(simd, one.mesh, &one.at) {
                 Shows::Yes(_) => visible.push(one.instance),
                 Shows::No(_) => {
