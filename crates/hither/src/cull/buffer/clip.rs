@@ -38,8 +38,8 @@ pub(super) fn clip(v: [[f64; 4]; 3], placing: &Placing) -> Option<Clipped> {
     }
     let empty = ([0.0; 4], EdgeOf::Cut);
     let mut polygon = Polygon { corner: [empty; 8], len: 3 };
-    for k in 0..3 {
-        polygon.corner[k] = (v[k], EdgeOf::Triangle(k as u8));
+    for (k, p) in v.into_iter().enumerate() {
+        polygon.corner[k] = (p, EdgeOf::Triangle(k as u8));
     }
     let (low, high) = (GUARD_MIN * 256.0, GUARD_MAX * 256.0);
     // Non-negative inside; the near plane first, so that W is positive for the others.

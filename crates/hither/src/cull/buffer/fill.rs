@@ -320,7 +320,7 @@ impl<'a> Face<'a> {
         let slack = i64::from(self.slack);
         End {
             least: -((size * slack + 256) >> 8) as i32,
-            most: (size * (128 + slack) >> 8) as i32,
+            most: ((size * (128 + slack)) >> 8) as i32,
             around: [
                 first_pixel(p.x.min(q.x), self.slack),
                 first_pixel(p.y.min(q.y), self.slack) - self.band,

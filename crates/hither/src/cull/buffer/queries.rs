@@ -54,9 +54,9 @@ impl Boxes {
         let mut reach = [0.0f32; 3];
         for sixteen in &self.sixteen {
             for lane in (0..16).filter(|&lane| sixteen.is_box(lane)) {
-                for axis in 0..3 {
+                for (axis, reach) in reach.iter_mut().enumerate() {
                     let (low, high) = (sixteen.min[axis][lane], sixteen.max[axis][lane]);
-                    reach[axis] = reach[axis].max(low.abs()).max(high.abs());
+                    *reach = reach.max(low.abs()).max(high.abs());
                 }
             }
         }

@@ -51,8 +51,8 @@ impl SampledBuffer {
         let mut lane = 0;
         for (number, (corners, two_sided)) in occluder.triangles().enumerate() {
             for (k, p) in corners.into_iter().enumerate() {
-                for axis in 0..3 {
-                    block.corner[k][axis][lane] = p[axis];
+                for (axis, coordinate) in p.into_iter().enumerate() {
+                    block.corner[k][axis][lane] = coordinate;
                 }
             }
             block.triangle[lane] = number as u32;
