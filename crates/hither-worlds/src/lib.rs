@@ -12,14 +12,19 @@
 
 mod benchmark_axes;
 mod boxcity;
+mod city;
 mod clutter;
 mod hills;
 mod lcg;
 mod lecture;
 mod office;
 mod palette;
+mod sheets;
+mod soda;
 mod spec;
 mod spheres;
+mod stroll;
+mod tetra;
 
 pub use spec::{KeyDefault, KeyInfo, WorldError, WorldInfo};
 
@@ -27,8 +32,17 @@ use hither::geometry::Aabb;
 use hither::scene::Scene;
 use spec::Values;
 
-static WORLDS: &[WorldInfo] =
-    &[office::INFO, boxcity::INFO, clutter::INFO, spheres::INFO, hills::INFO, lecture::INFO];
+static WORLDS: &[WorldInfo] = &[
+    office::INFO,
+    boxcity::INFO,
+    clutter::INFO,
+    spheres::INFO,
+    hills::INFO,
+    lecture::INFO,
+    soda::INFO,
+    city::INFO,
+    tetra::INFO,
+];
 
 /// Generates the world that `spec` asks for, `NAME?key=value&…`. Keys left out take their defaults.
 ///
