@@ -4,8 +4,10 @@
 //!   together with how sure that is. [`Probe::judge`] holds any other answer against it.
 //! - [`zbuffer`] is the textbook z-buffer with the fill rule of `conventions`: a second witness that shares
 //!   nothing with the first but the scene, and the plain code that speed-ups are measured against.
+//! - [`all_around`] says which triangles can be seen at all, looking all around, by cutting away what is hidden.
 //! - [`trouble`] makes small scenes that lean towards trouble, for both and for everything else.
 
+pub mod all_around;
 mod caster;
 mod probe;
 pub mod sight;
