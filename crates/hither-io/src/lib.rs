@@ -11,6 +11,7 @@ mod error;
 mod exr;
 mod format;
 pub mod gltf;
+mod map;
 pub mod obj;
 mod oddities;
 pub mod ply;
@@ -27,6 +28,7 @@ pub use companions::{Companions, ModelFolder};
 pub use error::{Diagnostic, Error, Loaded};
 pub use exr::{ExrImage, write_exr};
 pub use gltf::write_glb;
+pub use map::write_map;
 pub use png::write_png;
 
 use format::Format;
