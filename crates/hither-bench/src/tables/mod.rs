@@ -7,6 +7,7 @@ mod exact;
 mod greene;
 mod growth;
 mod load;
+mod planes;
 mod scaling;
 mod simple;
 mod trees;
@@ -51,6 +52,11 @@ pub static TABLES: &[TableInfo] = &[
     trees::INFO,
     load::INFO,
     cull::INFO,
+    planes::TREE,
+    planes::CULLED,
+    planes::SPEED,
+    planes::THREADS,
+    planes::FUTURE,
 ];
 
 const fn column(key: &'static str, title: &'static str, digits: usize) -> Column {
