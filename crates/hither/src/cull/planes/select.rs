@@ -10,6 +10,10 @@ use super::tree::Tree;
 use crate::geometry::Aabb;
 use glam::DVec3;
 
+/// Most entries in all leaves together, and on average in a leaf.
+const MOST_ENTRIES: usize = 1 << 24;
+const MOST_IN_A_LEAF: usize = 1024;
+
 /// Potential occluders of every leaf.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Potential {
@@ -21,13 +25,17 @@ pub(super) struct Potential {
 }
 
 impl Potential {
-    /// Enters each occluder where its area-angle may exceed `threshold` steradians.
+    /// Enters each occluder where its area-angle may exceed `threshold` steradians; in a scene of very many
+    /// polygons, as many times four of that as keep the lists short.
     pub fn new(occluders: &Occluders, tree: &Tree, threshold: f64) -> Potential {
-        let mut of_node: Vec<Vec<u32>> = vec![Vec::new(); tree.nodes.len()];
-        for (number, occluder) in occluders.all.iter().enumerate() {
-            let volume = significance(occluder, threshold);
-            enter(tree, 0, &volume, number as u32, &mut of_node);
-        }
+        let most = MOST_ENTRIES.min(MOST_IN_A_LEAF * tree.nodes.len().div_ceil(2));
+        let mut threshold = threshold;
+        let of_node = loop {
+            match entered(occluders, tree, threshold, most) {
+                Some(lists) => break lists,
+                None => threshold *= 4.0,
+            }
+        };
         let mut potential =
             Potential { everything: (0..occluders.all.len() as u32).collect(), ..Potential::default() };
         for list in of_node {
@@ -69,17 +77,32 @@ fn significance(occluder: &Occluder, threshold: f64) -> Aabb {
     Aabb { min: occluder.centre - down - across, max: occluder.centre + up + across }
 }
 
-fn enter(tree: &Tree, node: u32, volume: &Aabb, occluder: u32, of_node: &mut [Vec<u32>]) {
+/// The list of every node; `None` if they hold more than `most` together.
+fn entered(occluders: &Occluders, tree: &Tree, threshold: f64, most: usize) -> Option<Vec<Vec<u32>>> {
+    let mut of_node: Vec<Vec<u32>> = vec![Vec::new(); tree.nodes.len()];
+    let mut entries = 0;
+    for (number, occluder) in occluders.all.iter().enumerate() {
+        let volume = significance(occluder, threshold);
+        entries += enter(tree, 0, &volume, number as u32, &mut of_node);
+        if entries > most {
+            return None;
+        }
+    }
+    Some(of_node)
+}
+
+/// Returns in how many leaves the occluder was entered.
+fn enter(tree: &Tree, node: u32, volume: &Aabb, occluder: u32, of_node: &mut [Vec<u32>]) -> usize {
     let cell = &tree.nodes[node as usize].cell;
     if cell.min.cmpgt(volume.max).any() || cell.max.cmplt(volume.min).any() {
-        return;
+        return 0;
     }
     if tree.is_leaf(node) {
         of_node[node as usize].push(occluder);
-        return;
+        return 1;
     }
-    enter(tree, node + 1, volume, occluder, of_node);
-    enter(tree, tree.nodes[node as usize].right, volume, occluder, of_node);
+    enter(tree, node + 1, volume, occluder, of_node)
+        + enter(tree, tree.nodes[node as usize].right, volume, occluder, of_node)
 }
 
 /// The area-angle of an occluder from `eye`, steradians, with the side that it turns to the eye; 0 for
