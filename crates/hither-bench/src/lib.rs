@@ -60,7 +60,8 @@ pub enum BenchError {
 pub fn run(name: Option<&str>, options: &Options) -> Result<Report, BenchError> {
     let wanted: Vec<&TableInfo> = TABLES.iter().filter(|t| name.is_none_or(|n| t.answers_to(n))).collect();
     if let (Some(name), true) = (name, wanted.is_empty()) {
-        let known: Vec<&str> = TABLES.iter().map(|t| t.name).collect();
+        let mut known: Vec<&str> = TABLES.iter().map(|t| t.name).collect();
+        known.dedup();
         return Err(BenchError::UnknownTable { name: name.to_owned(), known: known.join(", ") });
     }
     let mut report = Report::of_this_machine(format!("{:?}", RenderOptions::default().level));

@@ -404,7 +404,34 @@ fn cull_refuses_what_it_cannot_do() {
     refused(&["cull", WORLD, "--margin", "-1"], 2, &["--margin", "metres"]);
     refused(&["cull", WORLD, "--margin", "nan"], 2, &["--margin", "metres"]);
     refused(&["cull", WORLD, "--method", "exact", "--margin", "1"], 2, &["--margin", "buffer"]);
+    refused(&["cull", WORLD, "--method", "exact", "--map", "x.svg"], 2, &["--map", "planes"]);
+    refused(&["cull", WORLD, "--method", "planes", "--map", "x.png"], 2, &["x.png", ".svg"]);
+    refused(&["cull", WORLD, "--method", "planes", "--occluders", "0"], 2, &["--occluders", "auto"]);
+    refused(&["cull", WORLD, "--method", "planes", "--reasons"], 2, &["--reasons", "buffer"]);
+    refused(&["cull", "world:office?n=33", "--method", "planes"], 1, &["539,055,000", "--method buffer"]);
     refused(&["cull", WORLD, "--size", "0x10"], 1, &["0x10"]);
     refused(&["cull", WORLD, "--size", "16385x10"], 1, &["16385x10"]);
     refused(&["cull", "no-such.glb"], 1, &["no-such.glb"]);
+}
+
+#[test]
+fn cull_by_planes_writes_maps_and_hides_nothing_that_is_seen() {
+    let folder = Folder::new("map");
+    let map = folder.path("map.svg");
+    let visible = |method: &str, map: &[&str]| -> Vec<u64> {
+        let world = ["cull", "world:tetra", "--camera", "walk", "--size", "320x200", "--json", "-"];
+        let frames = ["--frames", "0..3", "--fps", "2", "--method", method];
+        let output = done(&[&world, frames.as_slice(), map].concat());
+        let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let last = json["frames"][2]["visible"].as_array().unwrap().iter();
+        last.map(|i| i["instance"].as_u64().unwrap()).collect()
+    };
+    let planes = visible("planes", &["--map", &map]);
+    let exact = visible("exact", &[]);
+    assert!(exact.iter().all(|i| planes.contains(i)) && planes.len() < 600, "{planes:?}");
+    assert_eq!(folder.names(), ["map.0000.svg", "map.0001.svg", "map.0002.svg"]);
+    let text = fs::read_to_string(folder.0.join("map.0002.svg")).unwrap();
+    assert!(text.starts_with("<svg") && text.matches("<polygon").count() > 3601, "{}", text.len());
+    let margin = visible("planes", &["--margin", "0.5"]);
+    assert!(exact.iter().all(|i| margin.contains(i)));
 }

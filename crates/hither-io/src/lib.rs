@@ -12,6 +12,7 @@ mod error;
 mod exr;
 mod format;
 pub mod gltf;
+mod map;
 pub mod obj;
 mod oddities;
 mod openraster;
@@ -30,6 +31,7 @@ pub use drawing::{Sheet, SheetView, Unit, write_drawing_json, write_dxf, write_s
 pub use error::{Diagnostic, Error, Loaded};
 pub use exr::{ExrImage, LayerPicture, write_exr, write_exr_layers};
 pub use gltf::write_glb;
+pub use map::write_map;
 pub use openraster::write_openraster;
 pub use png::write_png;
 pub use texture::read_picture;

@@ -13,14 +13,19 @@
 mod benchmark_axes;
 mod boxcity;
 mod canyon;
+mod city;
 mod clutter;
 mod hills;
 mod lcg;
 mod lecture;
 mod office;
 mod palette;
+mod sheets;
+mod soda;
 mod spec;
 mod spheres;
+mod stroll;
+mod tetra;
 mod toothpicks;
 
 pub use spec::{KeyDefault, KeyInfo, WorldError, WorldInfo};
@@ -39,6 +44,9 @@ static WORLDS: &[WorldInfo] = &[
     lecture::INFO,
     toothpicks::INFO,
     canyon::INFO,
+    soda::INFO,
+    city::INFO,
+    tetra::INFO,
 ];
 
 /// Generates the world that `spec` asks for, `NAME?key=value&…`. Keys left out take their defaults.

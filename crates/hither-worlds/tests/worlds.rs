@@ -266,3 +266,47 @@ fn the_canyon_has_the_papers_polygons() {
     }
     assert_eq!(scene.instance_count(), 2 + 36);
 }
+
+#[test]
+fn soda_city_and_tetra_have_the_papers_polygons_and_walk_where_it_is_free() {
+    for (name, polygons) in [("soda", 1685), ("city", 2857), ("tetra", 3601)] {
+        let mut scene = world(name);
+        // Polygons are fans with vertices of their own: the triangles are the corners less two a polygon.
+        let corners: usize = scene.meshes.iter().map(|m| m.positions.len()).sum();
+        let triangles: usize = scene.meshes.iter().map(|m| m.triangles.len()).sum();
+        assert_eq!((corners - triangles) / 2, polygons, "{name}");
+        assert!(scene.materials.iter().all(|m| m.double_sided), "{name}");
+        let camera = scene.find_camera("walk").unwrap();
+        for step in 0..=300 {
+            scene.pose(0, f64::from(step) * 0.2);
+            let eye = scene.world_from_camera(camera).unwrap().translation;
+            let clear = clearance(&scene, eye);
+            assert!(clear > 0.4, "{name} step {step}: {clear} m at {eye}");
+        }
+        assert_ne!(
+            format!("{:?}", world(&format!("{name}?walk=1")).animations),
+            format!("{:?}", world(&format!("{name}?walk=2")).animations)
+        );
+    }
+}
+
+/// Distance from `p` to the nearest triangle, by its nearest corner, edge or inner point.
+fn clearance(scene: &Scene, p: DVec3) -> f64 {
+    let of_triangle = |mesh: &hither::scene::Mesh, t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| mesh.positions[v as usize].as_dvec3());
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let foot = p - normal * normal.dot(p - a);
+        let inside =
+            [(a, b), (b, c), (c, a)].iter().all(|(q, r)| (*r - *q).cross(foot - *q).dot(normal) >= 0.0);
+        if inside {
+            return p.distance(foot);
+        }
+        let to_edge = |q: DVec3, r: DVec3| {
+            let t = ((p - q).dot(r - q) / (r - q).length_squared()).clamp(0.0, 1.0);
+            p.distance(q.lerp(r, t))
+        };
+        to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
+    };
+    let meshes = scene.meshes.iter();
+    meshes.flat_map(|m| m.triangles.iter().map(move |t| of_triangle(m, t))).fold(f64::INFINITY, f64::min)
+}

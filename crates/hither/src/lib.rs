@@ -4,7 +4,8 @@
 //! The crate opens no file, no device and no socket, and prints nothing; `hither-io` reads and writes files.
 //!
 //! Rooms, from the ground up (a room uses only rooms below it; `cargo xtask tidy` checks):
-//! [`conventions`], [`geometry`], [`scene`], [`index`] and [`raster`], [`order`], [`render`](mod@render), [`layers`];
+//! [`conventions`]; [`geometry`]; [`scene`], [`raster`]; [`index`]; [`order`], [`cull`]; [`render`](mod@render),
+//! [`hidden_line`], [`classic`]; [`layers`].
 //! [`reference`](mod@reference) is the brute-force truth that every fast answer is tested against.
 #![forbid(unsafe_code)]
 

@@ -10,6 +10,7 @@ mod growth;
 mod lines;
 mod load;
 mod order;
+mod planes;
 mod scaling;
 mod simple;
 mod trees;
@@ -68,6 +69,11 @@ pub static TABLES: &[TableInfo] = &[
     order::CANYON,
     order::RIVALS,
     cull::INFO,
+    planes::TREE,
+    planes::CULLED,
+    planes::SPEED,
+    planes::THREADS,
+    planes::FUTURE,
 ];
 
 const fn column(key: &'static str, title: &'static str, digits: usize) -> Column {

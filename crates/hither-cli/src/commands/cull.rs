@@ -1,5 +1,7 @@
 //! `hither cull`: which instances could be seen.
 
+mod planes;
+
 use super::report::{self, Seen};
 use crate::console::{self, Verbosity};
 use crate::eye::Eye;
@@ -25,7 +27,7 @@ pub struct Arguments {
     /// How it is found out
     #[arg(long, value_name = "NAME", default_value = "buffer")]
     method: MethodName,
-    /// How far the eye may move while the answer stays true, in metres (method buffer)
+    /// How far the eye may move while the answer stays true, in metres (methods buffer and planes)
     #[arg(long, value_name = "METRES", value_parser = metres, default_value = "0", allow_hyphen_values = true)]
     margin: f64,
     /// Start each frame with what hid something in the last (method buffer)
@@ -34,6 +36,8 @@ pub struct Arguments {
     /// Also say of each instance why it was judged as it was (method buffer)
     #[arg(long)]
     reasons: bool,
+    #[command(flatten)]
+    planes: planes::Options,
     #[command(flatten)]
     view: ViewOptions,
     #[command(flatten)]
@@ -45,6 +49,8 @@ pub struct Arguments {
 enum MethodName {
     /// Conservative occlusion buffer: what is left out cannot be seen
     Buffer,
+    /// Planes through the eye and the sides of large polygons, no image: what is left out cannot be seen
+    Planes,
     /// What is nearest at some pixel centre: what is left out may be seen between centres
     Exact,
 }
@@ -62,8 +68,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     check(arguments)?;
     let verbosity = arguments.report.verbosity();
     let to = arguments.report.json.as_deref();
+    planes::check_map(arguments)?;
     outputs::check_report(to)?;
     let mut scene = source::open(&arguments.scene, verbosity)?;
+    if arguments.method == MethodName::Planes {
+        planes::check_scene(&scene, &arguments.scene)?;
+    }
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     timeline.pose_first(&mut scene);
     let eye = Eye::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
@@ -78,6 +88,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         timeline.pose(&mut index, number);
         let view = eye.view(index.scene(), arguments.view.size);
         let found = method.find(&index, &view)?;
+        if let Method::Planes(planes) = &method {
+            planes.write_map(number, timeline.numbered)?;
+        }
         bar.suspend(|| say(&index, &found, number, to, verbosity))?;
         bar.inc(1);
         if to.is_some() {
@@ -93,8 +106,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn check(arguments: &Arguments) -> Result<(), Failure> {
     let buffer = arguments.method == MethodName::Buffer;
-    if !buffer && (arguments.margin > 0.0 || arguments.reasons || arguments.coherence) {
-        return Err(Failure::usage("--margin, --reasons and --coherence go with --method buffer"));
+    if !buffer && (arguments.reasons || arguments.coherence) {
+        return Err(Failure::usage("--reasons and --coherence go with --method buffer"));
+    }
+    if arguments.method == MethodName::Exact && arguments.margin > 0.0 {
+        return Err(Failure::usage("--margin goes with --method buffer or planes"));
     }
     Ok(())
 }
@@ -103,12 +119,14 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
 enum Method {
     Buffer(Box<Culler>, CullOptions),
     Exact(Box<Renderer>),
+    Planes(Box<planes::Planes>),
 }
 
 impl Method {
     fn new(arguments: &Arguments, index: &SceneIndex) -> Method {
         match arguments.method {
             MethodName::Exact => Method::Exact(Box::default()),
+            MethodName::Planes => Method::Planes(Box::new(planes::Planes::new(arguments, index))),
             MethodName::Buffer => {
                 let mut culler = Box::new(Culler::new());
                 culler.prepare(index);
@@ -137,6 +155,7 @@ impl Method {
                 });
                 Ok(Found { visible: found.visible, reasons, counters: counters(&found.counters), time })
             }
+            Method::Planes(planes) => planes.find(index, view),
             Method::Exact(renderer) => {
                 let frame = renderer
                     .render(index, view, &RenderOptions::default())

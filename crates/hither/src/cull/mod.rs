@@ -4,8 +4,12 @@
 //! rectangles and meshes, in any order. What it calls hidden is hidden in the continuous image, whatever the
 //! buffer's resolution. [`Culler`] does that for a whole scene: it chooses the occluders and returns the instances
 //! that may be seen, front to back.
+//!
+//! [`planes`] needs no image and has no resolution: large polygons near the eye cast shadows, and what lies
+//! wholly in a shadow is hidden [Coorg & Teller 1996].
 
 mod buffer;
+pub mod planes;
 mod scene;
 
 pub use buffer::{

@@ -7,8 +7,10 @@
 //! - [`lines`] samples the edges of a line drawing densely and casts a ray to each sample.
 //! - [`occlusion`] tells by brute force which convex body occludes which, and [`ivs`] sorts them step by step as
 //!   the incremental visibility sort was published.
+//! - [`all_around`] says which triangles can be seen at all, looking all around, by cutting away what is hidden.
 //! - [`trouble`] makes small scenes that lean towards trouble, for both and for everything else.
 
+pub mod all_around;
 mod caster;
 pub mod ivs;
 pub mod lines;

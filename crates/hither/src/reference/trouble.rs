@@ -46,7 +46,8 @@ impl Random {
         self.below(n) == 0
     }
 
-    fn point(&mut self, reach: f64) -> DVec3 {
+    /// A point with coordinates between −`reach` and `reach`.
+    pub fn point(&mut self, reach: f64) -> DVec3 {
         DVec3::new(self.between(-reach, reach), self.between(-reach, reach), self.between(-reach, reach))
     }
 
