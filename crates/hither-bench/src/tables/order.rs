@@ -111,6 +111,7 @@ pub(crate) const OBJECTS: TableInfo = TableInfo {
 };
 
 /// Objects, and the paper's mean and worst milliseconds in both densities.
+#[expect(clippy::approx_constant, reason = "6.28 is a time here")]
 const FIG_18: [(u64, [f64; 4]); 7] = [
     (25, [1.51, 2.40, 1.32, 2.28]),
     (50, [2.51, 3.55, 2.17, 3.11]),

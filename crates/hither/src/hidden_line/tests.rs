@@ -175,7 +175,6 @@ fn drawings_agree_with_dense_sampling_on_troublesome_scenes() {
         unsure += score.unsure;
         wrong.extend(score.wrong.into_iter().map(|w| format!("seed {seed}: {w}")));
     }
-    println!("{right} right, {unsure} unsure, {} wrong", wrong.len());
     assert!(wrong.is_empty(), "{} wrong of {right}; {:#?}", wrong.len(), &wrong[..wrong.len().min(12)]);
     assert!(unsure * 20 < right, "{unsure} unsure, {right} right");
 }
@@ -192,7 +191,6 @@ fn drawings_agree_with_dense_sampling_on_bodies_that_touch() {
             wrong.extend(score.wrong.into_iter().map(|w| format!("{name} {v}: {w}")));
         }
     }
-    println!("{right} right, {unsure} unsure, {} wrong", wrong.len());
     assert!(wrong.is_empty(), "{} wrong of {right}; {:#?}", wrong.len(), &wrong[..wrong.len().min(12)]);
     assert!(unsure * 4 < right, "{unsure} unsure, {right} right");
 }
@@ -341,7 +339,6 @@ fn faces_are_what_rays_see_and_tile() {
         right += r;
         unsure += u;
     }
-    println!("{right} right, {unsure} unsure");
     assert!(unsure * 100 < right, "{unsure} unsure, {right} right");
 }
 

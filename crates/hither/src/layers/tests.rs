@@ -50,11 +50,10 @@ fn puzzle(random: &mut Random) -> (Vec<Sprite>, Vec<(u32, u32)>, Canvas) {
     const SIDE: u32 = 16;
     let n = 2 + random.below(7);
     let mut before = vec![vec![false; n as usize]; n as usize];
-    for a in 0..n as usize {
-        for b in a + 1..n as usize {
-            let first = random.below(2) == 0;
-            (before[a][b], before[b][a]) = (first, !first);
-        }
+    let pairs = (0..n as usize).flat_map(|a| (a + 1..n as usize).map(move |b| (a, b)));
+    for (a, b) in pairs {
+        let first = random.below(2) == 0;
+        (before[a][b], before[b][a]) = (first, !first);
     }
     let mut pictures = vec![Canvas::new(SIDE, SIDE); n as usize];
     let mut truth = Canvas::new(SIDE, SIDE);

@@ -162,7 +162,7 @@ fn perform(seed: u64, frames: usize, spread: f64, options: SortOptions) -> usize
             _ => {
                 eye += random.vector() * 0.1;
                 for pose in stage.poses.iter_mut().flatten() {
-                    *pose = *pose * random.pose(0.02);
+                    *pose *= random.pose(0.02);
                 }
             }
         }

@@ -130,12 +130,7 @@ pub(super) fn fill_block<S: Simd>(
             win_ties(target, paint.how.id, at, tied, z.simd_gt(f32x16::splat(simd, 0.0)).to_bitmask() as u32);
     }
     if paint.how.masked {
-        let candidates = write;
-        for p in (0..16).filter(|p| candidates & (1 << p) != 0) {
-            if is_hole(target.left + corner.0 + (p & 3), target.top + corner.1 + (p >> 2)) {
-                write &= !(1 << p);
-            }
-        }
+        write = without_holes(write, (target.left + corner.0, target.top + corner.1), is_hole);
     }
     if write == 0 {
         return false;
@@ -170,6 +165,15 @@ pub(super) fn fill_block<S: Simd>(
         return false;
     }
     target.raise_block_minimum(tile, block, new.reduce_min())
+}
+
+/// Of a block's pixels, those that are no holes; `corner` is its first image pixel.
+#[inline(never)]
+fn without_holes(pixels: u32, corner: (i32, i32), is_hole: &mut dyn FnMut(i32, i32) -> bool) -> u32 {
+    (0..16)
+        .filter(|p| pixels & (1 << p) != 0)
+        .filter(|p| !is_hole(corner.0 + (p & 3), corner.1 + (p >> 2)))
+        .fold(0, |kept, p| kept | 1 << p)
 }
 
 /// Of the pixels that hold exactly this depth, those whose surface has a larger id.

@@ -214,7 +214,13 @@ pub(super) fn set_up<S: Simd>(
     top.store_slice(&mut lanes.top.0);
     right.store_slice(&mut lanes.right.0);
     bottom.store_slice(&mut lanes.bottom.0);
-    let planes = [depth_plane(simd, &low), depth_plane(simd, &high)];
+    store_depths(simd, &low, &high, lanes);
+}
+
+/// Stores the lanes' depth planes, and their corners' least and largest depths.
+#[inline(always)]
+fn store_depths<S: Simd>(simd: S, low: &Eight<S>, high: &Eight<S>, lanes: &mut Lanes) {
+    let planes = [depth_plane(simd, low), depth_plane(simd, high)];
     for (i, plane) in lanes.plane.iter_mut().enumerate() {
         for half in 0..2 {
             planes[half][i].store_slice(&mut plane[half].0);

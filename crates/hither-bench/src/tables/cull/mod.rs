@@ -30,9 +30,11 @@ pub(crate) const INFO: TableInfo = TableInfo {
     ],
 };
 
-/// Scene, camera, and the best peer's draw time and false-visible share at each size, as measured on another
-/// machine.
-const SCENES: [(&str, &str, [(f64, f64); 2]); 3] = [
+/// A draw time in milliseconds, and a share of false-visible boxes in percent.
+type PeerFigures = (f64, f64);
+
+/// Scene, camera, and the best peer's figures at each size, as measured on another machine.
+const SCENES: [(&str, &str, [PeerFigures; 2]); 3] = [
     ("boxcity", "street", [(0.59, 0.5), (0.21, 1.5)]),
     ("clutter", "front", [(2.3, 4.0), (1.0, 7.0)]),
     ("spheres", "front", [(12.8, 15.0), (10.8, 22.0)]),
