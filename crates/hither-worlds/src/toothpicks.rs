@@ -54,7 +54,7 @@ const SPHERE_RADIUS: f64 = 0.05;
 const CYLINDER_RADIUS: f64 = 0.03;
 const FRAMES_A_SECOND: f64 = 60.0;
 /// Of a centre, metres a second: with the turning it makes the paper's speed at the tip.
-const SPEED: f64 = 0.0019 * 2.0 * HALF * FRAMES_A_SECOND;
+const SPEED: f64 = 0.002_145 * 2.0 * HALF * FRAMES_A_SECOND;
 /// Turning moves a tip as fast as the centre.
 const TURNING: f64 = SPEED / LONG;
 /// The camera goes around the cube, radians a second.
