@@ -319,7 +319,7 @@ pub fn painted(order: &[Facet]) -> Vec<Region> {
 }
 
 impl Facet {
-    /// Perpendicular to the facet, as long as twice its area [Newell].
+    /// Perpendicular to the facet, as long as twice its area (Newell).
     pub(super) fn normal(&self) -> DVec3 {
         let n = self.points.len();
         (0..n)

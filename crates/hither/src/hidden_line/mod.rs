@@ -1,7 +1,7 @@
 //! A scene as a line drawing: exactly the parts of its lines that are seen, as line segments in the plane.
 //!
 //! [`Preparation::new`] finds the edges of every mesh once; [`Preparation::draw`] makes a [`Drawing`] for a
-//! [`View`], and may be called for as many views as one likes. There is no file format here.
+//! [`View`](crate::conventions::View), and may be called for as many views as one likes. There is no file format here.
 //!
 //! How a drawing is made:
 //! 1. `shown`: instances that may be seen are clipped and projected, nearest first; `cover` notes for each

@@ -6,8 +6,8 @@
 //! still occlude each other in cycles, and an [`Expression`] of Porter and Duff's operators on their images is the
 //! component's picture all the same. [`Program`] is its form for a machine with three image registers.
 //!
-//! [`LayerPainter`] draws layers with [`render`](crate::render); [`depth_of_field`](mod@depth_of_field) blurs each by its own circle of
-//! confusion, and [`reuse`](mod@reuse) warps what was drawn before instead of drawing it again.
+//! [`LayerPainter`] draws layers with [`render`](mod@crate::render); [`depth_of_field`](mod@depth_of_field) blurs each
+//! by its own circle of confusion, and [`reuse`](mod@reuse) warps what was drawn before instead of drawing it again.
 //!
 //! Where pixels are either covered or not, the composite is the direct picture to the last bit. Where coverage is
 //! fractional it is the usual approximation: edges in a pixel are taken as independent.
