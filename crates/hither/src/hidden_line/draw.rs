@@ -221,7 +221,7 @@ fn grid_over(placed: &[Placed], picture: DVec2, triangles: usize) -> Grid {
         max = max.max(p.max);
     }
     let (min, max) = (min.max(DVec2::ZERO), max.min(picture));
-    let side = ((triangles as f64).sqrt() * 1.5) as usize;
+    let side = ((triangles as f64).sqrt() * 0.75) as usize;
     Grid::over(min, max.max(min), side.clamp(8, MOST_CELLS))
 }
 
