@@ -92,7 +92,7 @@ impl Cover {
             let alone = covered
                 && occluders.in_cell(cell).iter().all(|&i| {
                     let occluder = &occluders.list[i as usize];
-                    if occluder.nearest < self.bound[cell] {
+                    if f64::from(occluder.nearest) < self.bound[cell] {
                         return true;
                     }
                     let corners = shown.corners(occluder.triangle);
@@ -124,7 +124,7 @@ impl Cover {
     pub fn add(&mut self, shown: &Shown, hides: impl Fn(u32) -> bool) {
         let Some(solid) = shown.solids.last() else { return };
         for t in solid.first_triangle..solid.first_triangle + solid.triangle_count {
-            if shown.facing[t as usize] != 0 && hides(t) {
+            if shown.fate[t as usize] == Fate::Live && hides(t) {
                 self.sample(shown, t);
             }
         }

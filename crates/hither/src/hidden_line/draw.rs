@@ -14,7 +14,7 @@ use super::occluders::Occluders;
 use super::shown::{Fate, Shown};
 use super::strokes;
 use super::topology::NONE;
-use super::trace::{Scratch, Tracer};
+use super::trace::{NO_SHEET, Own, Scratch, Tracer};
 use super::{FaceColor, Kinds, LineOptions, Preparation};
 use crate::conventions::{View, ViewError};
 use crate::geometry::Aabb;
@@ -141,6 +141,10 @@ impl Preparation {
                 continue;
             }
             shown.add(&self.meshes[p.mesh as usize], p.part, &p.view_from_mesh, p.cut);
+            let topology = &self.meshes[p.mesh as usize];
+            if !options.hidden && (options.transparent_hides || topology.see_through.is_empty()) {
+                shown.leave_out_backs(&p.view_from_mesh);
+            }
             if let Some(cover) = &mut cover {
                 let see_through = see_through(&shown, options);
                 cover.add(&shown, |t| !see_through(t));
@@ -253,12 +257,15 @@ fn trace_edges(
                 continue;
             }
             lines += 1;
-            let own = |t: u32| has_edge(&shown.triangles[t as usize], ends);
-            let anchored = edge.triangles.iter().any(|&t| {
-                let place = shown.place(solid, t);
-                place != NONE && is_live(shown, place) && hides(place)
-            });
-            tracer.trace([p, q], own, anchored, scratch);
+            let places = edge.triangles.map(|t| shown.place(solid, t));
+            let live = places.map(|t| t != NONE && is_live(shown, t) && hides(t));
+            let sheet = |k: usize| if live[k] { shown.sheet(solid, places[k]) } else { None };
+            let own = Own {
+                owns: |t: u32| has_edge(&shown.triangles[t as usize], ends),
+                anchored: live.contains(&true),
+                sheets: [0, 1].map(|k| sheet(k).unwrap_or(NO_SHEET)),
+            };
+            tracer.trace([p, q], &own, scratch);
             push_parts(&mut pieces, p, q, solid.part, kind, scratch);
         }
         (pieces, lines, std::mem::take(&mut scratch.tests))

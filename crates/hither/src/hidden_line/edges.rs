@@ -38,7 +38,8 @@ impl Choice {
         if fates.contains(&Fate::Outside) || (!self.hidden && fates.contains(&Fate::Hidden)) {
             return None;
         }
-        if places == [NONE; 2] {
+        // On the back of a body.
+        if fates == [Fate::Back; 2] || places == [NONE; 2] {
             return None;
         }
         let kinds = &self.kinds;

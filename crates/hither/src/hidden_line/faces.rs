@@ -111,7 +111,7 @@ fn nearest(tracer: &Tracer, p: DVec2) -> Option<u32> {
     let mut best: Option<(f64, u32)> = None;
     for &i in occluders.in_cell(grid.index(grid.column(p.x), grid.row(p.y))) {
         let occluder = &occluders.list[i as usize];
-        if best.is_some_and(|(w, _)| occluder.nearest < w - shown.lens.coarse(w)) {
+        if best.is_some_and(|(w, _)| f64::from(occluder.nearest) < w - shown.lens.coarse(w)) {
             break;
         }
         let [a, b, c] = shown.corners(occluder.triangle);
@@ -120,7 +120,8 @@ fn nearest(tracer: &Tracer, p: DVec2) -> Option<u32> {
         if sides.iter().any(|&s| s < 0.0) && sides.iter().any(|&s| s > 0.0) {
             continue;
         }
-        let w = Plane::through(a, b, c).at(p).clamp(occluder.farthest, occluder.nearest);
+        let (farthest, nearest) = (a.z.min(b.z).min(c.z), a.z.max(b.z).max(c.z));
+        let w = Plane::through(a, b, c).at(p).clamp(farthest, nearest);
         let rank = |t: u32| (shown.part_of(t), t);
         let better = match best {
             None => true,

@@ -11,7 +11,7 @@ use super::draw::{Piece, has_edge, is_live, push_parts};
 use super::drawing::{Counters, Kind};
 use super::shown::Shown;
 use super::topology::{Mix, NONE};
-use super::trace::{Scratch, Tracer};
+use super::trace::{NO_SHEET, Own, Scratch, Tracer};
 use super::{Kinds, LineOptions};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -59,7 +59,17 @@ pub(super) fn add(
             if p.truncate() == q.truncate() {
                 continue;
             }
-            tracer.trace([p, q], |t| meeting.triangles.contains(&t), true, scratch);
+            let shown = tracer.shown;
+            let sheet = |t: u32| match shown.cap(t) {
+                Some(_) => None,
+                None => shown.sheet(&shown.solids[shown.solid_of(t)], t),
+            };
+            let own = Own {
+                owns: |t: u32| meeting.triangles.contains(&t),
+                anchored: true,
+                sheets: meeting.triangles.map(|t| sheet(t).unwrap_or(NO_SHEET)),
+            };
+            tracer.trace([p, q], &own, scratch);
             let part = meeting.triangles.map(|t| tracer.shown.part_of(t));
             push_parts(&mut pieces, p, q, part[0].min(part[1]), meeting.kind, scratch);
         }
@@ -118,8 +128,12 @@ pub(super) fn add_sections(tracer: &Tracer, all: bool, pieces: &mut Vec<Piece>, 
         if p.truncate() == q.truncate() {
             continue;
         }
-        let own = |t: u32| has_edge(&shown.triangles[t as usize], line.vertices);
-        tracer.trace([p, q], own, false, &mut scratch);
+        let own = Own {
+            owns: |t: u32| has_edge(&shown.triangles[t as usize], line.vertices),
+            anchored: false,
+            sheets: [NO_SHEET; 2],
+        };
+        tracer.trace([p, q], &own, &mut scratch);
         push_parts(pieces, p, q, shown.solids[line.solid as usize].part, Kind::Section, &scratch);
         counters.lines += 1;
     }
@@ -160,15 +174,16 @@ fn meetings_in_rows(tracer: &Tracer, planes: &[Plane], rows: Range<usize>, found
         let list = occluders.in_cell(cell);
         for (i, &a) in list.iter().enumerate() {
             let first = &occluders.list[a as usize];
-            let ra = first.rectangle();
-            let least = first.farthest - shown.lens.coarse(first.nearest);
+            let reach = first.bounds().reach();
+            let (farthest, nearest) = (f64::from(first.farthest), f64::from(first.nearest));
+            let least = farthest - shown.lens.coarse(nearest);
             let corners = shown.corners_in_view(first.triangle);
             for &b in &list[i + 1..] {
                 let second = &occluders.list[b as usize];
-                if second.nearest < least {
+                if f64::from(second.nearest) < least {
                     break;
                 }
-                if !second.meets(&ra)
+                if !second.bounds().meets(reach)
                     || planes[b as usize].misses(&corners, clear)
                     || planes[a as usize].misses(&shown.corners_in_view(second.triangle), clear)
                 {
@@ -176,16 +191,15 @@ fn meetings_in_rows(tracer: &Tracer, planes: &[Plane], rows: Range<usize>, found
                 }
                 // Pairs share several cells. Small ones count in the cell where their boxes' overlap begins;
                 // large ones are not in every cell, and count in each band once.
-                if first.large || second.large {
+                if occluders.large[a as usize] || occluders.large[b as usize] {
                     if known.insert((a, b)) {
                         let meeting = meeting(shown, first.triangle, second.triangle);
                         found.extend(meeting.map(|m| Meeting { repeats: true, ..m }));
                     }
                     continue;
                 }
-                let rb = second.rectangle();
-                let (x, y) = (f64::from(ra[0].max(rb[0])), f64::from(ra[1].max(rb[1])));
-                if grid.column(x) == column && grid.row(y) == row {
+                let begin = first.bounds().min().max(second.bounds().min());
+                if grid.column(begin.x) == column && grid.row(begin.y) == row {
                     found.extend(meeting(shown, first.triangle, second.triangle));
                 }
             }

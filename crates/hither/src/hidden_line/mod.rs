@@ -5,7 +5,8 @@
 //!
 //! How a drawing is made:
 //! 1. `shown`: instances that may be seen are clipped and projected, nearest first; `cover` notes for each
-//!    cell of a grid how far one can see there, and whole instances and triangles beyond that are left out.
+//!    cell of a grid how far one can see there, and whole instances and triangles beyond that are left out;
+//!    so are the backs of `bodies`.
 //! 2. `edges`: the edges to draw are chosen by their kind in this view. `intersections` adds the lines in
 //!    which surfaces meet.
 //! 3. `trace`: each line is followed through the grid; `hide` finds the exact part that one triangle hides.
@@ -22,6 +23,7 @@
 //! Not done: surfaces with holes by a mask are drawn solid.
 
 mod arrangement;
+mod bodies;
 mod caps;
 mod coincident;
 mod cover;

@@ -4,6 +4,7 @@
 //! no plane cuts keeps its mesh's numbering; one that is cut gets new vertices, each shared by all that meet
 //! at the cut edge, so that neighbours stay neighbours.
 
+use super::bodies::{Body, Paper};
 use super::lens::{HalfSpace, Lens};
 use super::predicates::orientation;
 use super::topology::{Mix, NONE, Topology};
@@ -21,6 +22,8 @@ pub(super) enum Fate {
     Outside,
     /// It is seen edge-on, or has no area: it hides nothing.
     EdgeOn,
+    /// It is on the back of a body whose front hides it, and all that it hides.
+    Back,
 }
 
 /// An instance in view.
@@ -34,6 +37,8 @@ pub(super) struct Solid<'p> {
     pub first_vertex: u32,
     pub first_triangle: u32,
     pub triangle_count: u32,
+    /// The first of its bodies in [`Shown::sheets`]; [`NONE`] if its bodies do not count.
+    pub first_body: u32,
     /// Of a solid that is cut: what the planes did.
     pub cut: Option<Cut>,
 }
@@ -65,6 +70,8 @@ pub(super) struct Shown<'p> {
     /// The sense of rotation of the projected corners: 1, −1, or 0 for edge-on.
     pub facing: Vec<i8>,
     pub fate: Vec<Fate>,
+    /// For each body, whether its front faces cover no point twice.
+    pub sheets: Vec<bool>,
     /// Of the triangles after those of all solids, what they close.
     pub caps: Vec<Cap>,
     /// Lines where planes cut, those of the view's range of depth among them.
@@ -97,6 +104,7 @@ impl<'p> Shown<'p> {
             triangles: Vec::new(),
             facing: Vec::new(),
             fate: Vec::new(),
+            sheets: Vec::new(),
             caps: Vec::new(),
             sections: Vec::new(),
         }
@@ -131,8 +139,40 @@ impl<'p> Shown<'p> {
             first_vertex,
             first_triangle,
             triangle_count: self.triangles.len() as u32 - first_triangle,
+            first_body: NONE,
             cut,
         });
+    }
+
+    /// Leaves out the backs of the last solid's bodies, and finds those that cannot hide their own fronts.
+    /// Not for drawings that count layers, nor for a solid with triangles that hide nothing.
+    pub fn leave_out_backs(&mut self, view_from_mesh: &DAffine3) {
+        let Some(solid) = self.solids.last_mut() else { return };
+        let bodies = &solid.topology.bodies;
+        let turn = view_from_mesh.matrix3.determinant();
+        if solid.cut.is_some() || bodies.list.is_empty() || !(turn.abs() > 0.0) {
+            return;
+        }
+        solid.first_body = self.sheets.len() as u32;
+        // Counter-clockwise as the eye sees it is clockwise on paper whose y points down.
+        let front: Vec<i8> =
+            bodies.list.iter().map(|b| if b.outward == (turn > 0.0) { -1 } else { 1 }).collect();
+        let first = solid.first_triangle as usize;
+        for (t, &body) in bodies.of.iter().enumerate() {
+            if body != NONE && self.facing[first + t] == -front[body as usize] {
+                self.fate[first + t] = Fate::Back;
+            }
+        }
+        let lens = self.lens;
+        let center = |b: &Body| lens.project(view_from_mesh.transform_point3(b.center));
+        let centers: Vec<DVec3> = bodies.list.iter().map(center).collect();
+        let paper = Paper {
+            facing: &self.facing[first..],
+            screen: &self.screen[solid.first_vertex as usize..],
+            front: &front,
+            centers: &centers,
+        };
+        self.sheets.extend(bodies.sheets(solid.topology, &paper));
     }
 
     /// Clips all triangles of the mesh; `None` if nothing is cut.
@@ -320,6 +360,18 @@ impl<'p> Shown<'p> {
         let of_mesh = self.mesh_triangle(triangle);
         let topology = self.solids[self.solid_of(triangle)].topology;
         topology.color(if of_mesh == NONE { 0 } else { of_mesh })
+    }
+
+    /// The body that a triangle of a solid is part of, if the body's front faces cover no point twice.
+    #[inline]
+    pub fn sheet(&self, solid: &Solid, triangle: u32) -> Option<u32> {
+        if solid.first_body == NONE {
+            return None;
+        }
+        match solid.topology.bodies.of(triangle - solid.first_triangle) {
+            NONE => None,
+            body => Some(solid.first_body + body).filter(|&sheet| self.sheets[sheet as usize]),
+        }
     }
 
     /// A triangle's corners on the paper.

@@ -1,5 +1,6 @@
 //! Whole drawings against dense sampling by rays, and what must not change a drawing.
 
+mod bodies;
 mod scenes;
 
 use super::{Drawing, Kinds, LineOptions, Preparation, PrepareOptions};

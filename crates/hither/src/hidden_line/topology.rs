@@ -4,6 +4,7 @@
 //! of texture coordinates is no boundary. Triangles without area are left out: they show nothing and hide
 //! nothing.
 
+use super::bodies::Bodies;
 use crate::scene::{AlphaMode, Mesh, Scene};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
@@ -51,6 +52,8 @@ pub(super) struct Topology {
     pub flips: Vec<u8>,
     /// All edges, by their smaller vertex.
     pub edges: Vec<Edge>,
+    /// Closed bodies among the triangles.
+    pub bodies: Bodies,
     /// Triangles that hide nothing if blended materials do not; empty where there are none.
     pub see_through: Vec<bool>,
     /// Ends of the runs of triangles with one material, and its colour, linear.
@@ -65,12 +68,18 @@ impl Topology {
     pub fn of(scene: &Scene, mesh: &Mesh, marked: &[[u32; 2]]) -> Topology {
         let (positions, name) = weld(&mesh.positions);
         let corner = |v: u32| name.as_ref().map_or(v, |n| n[v as usize]);
-        let triangles: Vec<[u32; 3]> =
-            mesh.triangles.iter().map(|t| solid(t.map(corner), &positions)).collect();
+        let mut triangles = Vec::with_capacity(mesh.triangles.len());
+        let mut normals = Vec::with_capacity(mesh.triangles.len());
+        for t in &mesh.triangles {
+            let (t, normal) = solid(t.map(corner), &positions);
+            triangles.push(t);
+            normals.push(normal);
+        }
         let mut topology = Topology {
             neighbours: vec![[NONE; 3]; triangles.len()],
             flips: vec![0; triangles.len()],
             edges: Vec::new(),
+            bodies: Bodies::default(),
             see_through: see_through(scene, mesh),
             colors: colors(scene, mesh),
             tints: tints(mesh),
@@ -78,13 +87,15 @@ impl Topology {
             triangles,
         };
         let materials = materials(mesh);
-        topology.find_edges(&materials);
+        topology.find_edges(&normals, &materials);
         if topology.drop_twins() {
             topology.edges.clear();
             topology.neighbours.fill([NONE; 3]);
             topology.flips.fill(0);
-            topology.find_edges(&materials);
+            topology.find_edges(&normals, &materials);
         }
+        topology.bodies =
+            Bodies::find(&topology.positions, &topology.triangles, &topology.neighbours, &topology.flips);
         if !marked.is_empty() {
             let wanted: std::collections::HashSet<[u32; 2]> =
                 marked.iter().map(|&[a, b]| ordered(corner(a), corner(b))).collect();
@@ -103,7 +114,7 @@ impl Topology {
     }
 
     /// Half-edges sorted by their smaller vertex (counting), then by the larger: runs are edges.
-    fn find_edges(&mut self, materials: &[u32]) {
+    fn find_edges(&mut self, normals: &[Vec3], materials: &[u32]) {
         let mut starts = vec![0u32; self.positions.len() + 1];
         let sides = |t: &[u32; 3]| [ordered(t[0], t[1]), ordered(t[1], t[2]), ordered(t[2], t[0])];
         for t in self.triangles.iter().filter(|t| t[0] != NONE) {
@@ -124,7 +135,6 @@ impl Topology {
             }
         }
         self.edges.reserve_exact(halves.len() / 2 + halves.len() / 16);
-        let normals: Vec<Vec3> = self.triangles.iter().map(|t| self.normal(t).as_vec3()).collect();
         for low in 0..self.positions.len() {
             let run = &mut halves[starts[low] as usize..starts[low + 1] as usize];
             run.sort_unstable();
@@ -132,7 +142,7 @@ impl Topology {
             while let Some(&(high, _)) = rest.first() {
                 let count = rest.iter().take_while(|h| h.0 == high).count();
                 let (same, others) = rest.split_at(count);
-                self.add_edge([low as u32, high], same, &normals, materials);
+                self.add_edge([low as u32, high], same, normals, materials);
                 rest = others;
             }
         }
@@ -185,26 +195,20 @@ impl Topology {
         }
         self.edges.push(edge);
     }
-
-    /// Unit normal of a triangle; zero for one without area.
-    fn normal(&self, t: &[u32; 3]) -> DVec3 {
-        if t[0] == NONE {
-            return DVec3::ZERO;
-        }
-        let [a, b, c] = t.map(|v| self.positions[v as usize].as_dvec3());
-        (b - a).cross(c - a).normalize_or_zero()
-    }
 }
 
 fn ordered(a: u32, b: u32) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// The corners, or [`NONE`] where they lie on a line or two are the same.
-fn solid(t: [u32; 3], positions: &[Vec3]) -> [u32; 3] {
+/// The corners, or [`NONE`] where they lie on a line or two are the same; and the unit normal, or zero.
+fn solid(t: [u32; 3], positions: &[Vec3]) -> ([u32; 3], Vec3) {
     let [a, b, c] = t.map(|v| positions[v as usize].as_dvec3());
-    let flat = (b - a).cross(c - a) == DVec3::ZERO;
-    if flat || t[0] == t[1] || t[1] == t[2] || t[2] == t[0] { [NONE; 3] } else { t }
+    let normal = (b - a).cross(c - a);
+    if normal == DVec3::ZERO || t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
+        return ([NONE; 3], Vec3::ZERO);
+    }
+    (t, normal.normalize_or_zero().as_vec3())
 }
 
 /// Distinct positions, and for each vertex its position's number; `None` where all are distinct.

@@ -7,8 +7,9 @@
 use super::cover::Cover;
 use super::grid::rectangle;
 use super::hide::{Hidden, hidden_part};
-use super::occluders::{Occluders, outwards};
+use super::occluders::{Bounds, Occluders};
 use super::shown::Shown;
+use super::topology::NONE;
 use glam::{DVec2, DVec3};
 
 /// A gap in what hides a line that is shorter than this, pixels, is rounding.
@@ -60,15 +61,8 @@ impl Scratch {
 
 impl Tracer<'_> {
     /// Finds the parts of the line from `p` to `q` that are inside the picture, in order, into
-    /// `scratch.parts`. Triangles of which `own` says yes are part of the line and cannot hide it; `anchored`
-    /// says that one of them is among the occluders.
-    pub fn trace(
-        &self,
-        [p, q]: [DVec3; 2],
-        own: impl Fn(u32) -> bool,
-        anchored: bool,
-        scratch: &mut Scratch,
-    ) {
+    /// `scratch.parts`.
+    pub fn trace(&self, [p, q]: [DVec3; 2], own: &Own<impl Fn(u32) -> bool>, scratch: &mut Scratch) {
         scratch.parts.clear();
         let Some((start, end)) = clip_to(p, q, self.picture) else { return };
         scratch.stamp = scratch.stamp.wrapping_add(1);
@@ -83,13 +77,13 @@ impl Tracer<'_> {
         let grid = &self.occluders.grid;
         let cells = grid.cells(min, max);
         let (columns, rows) = (cells.columns.1 - cells.columns.0, cells.rows.1 - cells.rows.0);
-        let line = Line { p, q, start, end, anchored };
+        let line = Line { p, q, start, end };
         let finished = if columns <= 1 && rows <= 1 {
-            self.slab(&line, (start, end), None, &own, scratch)
+            self.slab(&line, (start, end), None, own, scratch)
         } else if columns >= rows {
-            self.follow(&line, 0, &own, scratch)
+            self.follow(&line, 0, own, scratch)
         } else {
-            self.follow(&line, 1, &own, scratch)
+            self.follow(&line, 1, own, scratch)
         };
         if finished {
             return;
@@ -104,7 +98,13 @@ impl Tracer<'_> {
     }
 
     /// Cuts the line where it crosses columns (axis 0) or rows (axis 1); true if all of it is hidden.
-    fn follow(&self, line: &Line, axis: usize, own: &impl Fn(u32) -> bool, scratch: &mut Scratch) -> bool {
+    fn follow(
+        &self,
+        line: &Line,
+        axis: usize,
+        own: &Own<impl Fn(u32) -> bool>,
+        scratch: &mut Scratch,
+    ) -> bool {
         let grid = &self.occluders.grid;
         let (from, to) = (line.p[axis], line.q[axis]);
         let index = |x: f64| if axis == 0 { grid.column(x) } else { grid.row(x) };
@@ -136,7 +136,7 @@ impl Tracer<'_> {
         line: &Line,
         (t0, t1): (f64, f64),
         strip: Option<(usize, usize)>,
-        own: &impl Fn(u32) -> bool,
+        own: &Own<impl Fn(u32) -> bool>,
         scratch: &mut Scratch,
     ) -> bool {
         let at = |t: f64| line.p + (line.q - line.p) * t;
@@ -160,26 +160,29 @@ impl Tracer<'_> {
             scratch.hidden.push(Hidden { from: t0, to: t1 });
             return false;
         }
-        if line.anchored
+        if own.anchored
             && let Some(cover) = self.cover
             && cover.shows(cells, a.z.max(b.z))
         {
             return false;
         }
         let least = a.z.min(b.z);
-        let rectangle = outwards(min, max);
+        let reach = Bounds::around(min, max).reach();
         for row in cells.rows.0..=cells.rows.1 {
             for column in cells.columns.0..=cells.columns.1 {
                 for &i in self.occluders.in_cell(grid.index(column, row)) {
                     let occluder = &self.occluders.list[i as usize];
-                    if occluder.nearest < least {
+                    if f64::from(occluder.nearest) < least {
                         break;
                     }
-                    if !occluder.meets(&rectangle) || scratch.tried[i as usize] == scratch.stamp {
+                    if !occluder.bounds().meets(reach)
+                        || own.sheets.contains(&occluder.sheet)
+                        || scratch.tried[i as usize] == scratch.stamp
+                    {
                         continue;
                     }
                     scratch.tried[i as usize] = scratch.stamp;
-                    if own(occluder.triangle) {
+                    if (own.owns)(occluder.triangle) {
                         continue;
                     }
                     scratch.tests += 1;
@@ -197,13 +200,25 @@ impl Tracer<'_> {
     }
 }
 
+/// What a line is part of.
+pub(super) struct Own<F: Fn(u32) -> bool> {
+    /// The triangles that the line is part of: they cannot hide it.
+    pub owns: F,
+    /// Whether one of them is among the occluders.
+    pub anchored: bool,
+    /// The sheets that it is part of ([`Shown::sheet`]), which cannot hide it either.
+    pub sheets: [u32; 2],
+}
+
+/// No sheet, and not that of any triangle.
+pub(super) const NO_SHEET: u32 = NONE - 1;
+
 /// A line and the part of it inside the picture.
 struct Line {
     p: DVec3,
     q: DVec3,
     start: f64,
     end: f64,
-    anchored: bool,
 }
 
 /// What no hidden part covers.
