@@ -11,8 +11,9 @@
 //!
 //! All signs are exact, or certain where they say yes.
 
+use super::crew::Crew;
 use super::predicates::{counts_as_left, cross};
-use super::topology::{NONE, Topology};
+use super::topology::{Edge, NONE, Topology};
 use glam::{DVec3, Vec3};
 
 /// The star-shaped bodies of a mesh.
@@ -90,11 +91,24 @@ impl Bodies {
     }
 
     /// For each body, whether its front faces cover no point of the paper twice. Linear in the edges.
-    pub fn sheets(&self, topology: &Topology, paper: &Paper) -> Vec<bool> {
+    pub fn sheets(&self, crew: Crew, topology: &Topology, paper: &Paper) -> Vec<bool> {
+        let edges = &topology.edges;
+        // A share keeps a number for each body: with many bodies that would be more than the edges.
+        let shares = if self.list.len() < edges.len() / 16 {
+            crew.shares(edges.len(), 1)
+        } else {
+            vec![0..edges.len()]
+        };
+        let counts = crew.map(shares, |range| self.rounds(&edges[range], topology, paper));
+        (0..self.list.len()).map(|b| counts.iter().fold(0u32, |n, c| n.saturating_add(c[b])) == 1).collect()
+    }
+
+    /// How often the outline of each body's front is met on the way from its centre along +x; more than
+    /// twice where a part of it runs the other way around.
+    fn rounds(&self, edges: &[Edge], topology: &Topology, paper: &Paper) -> Vec<u32> {
         let is_front = |t: u32| paper.facing[t as usize] == paper.front[self.of[t as usize] as usize];
-        // How often the outline is met on the way from the centre along +x.
         let mut rounds = vec![0u32; self.list.len()];
-        for edge in &topology.edges {
+        for edge in edges {
             let [s, t] = edge.triangles;
             let body = self.of(s);
             if body == NONE {
@@ -120,7 +134,7 @@ impl Bodies {
             let rounds = &mut rounds[body as usize];
             *rounds = rounds.saturating_add(if turns_on { met } else { u32::MAX });
         }
-        rounds.into_iter().map(|n| n == 1).collect()
+        rounds
     }
 }
 

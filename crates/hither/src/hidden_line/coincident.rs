@@ -5,27 +5,39 @@
 //! important ones cover is taken away. What covers it is itself drawn, or covered by something more
 //! important still, so nothing is lost.
 
+use super::crew::Crew;
 use super::draw::Piece;
-use super::grid::Grid;
+use super::grid::{Grid, Places, Sorted};
 use glam::DVec2;
+use std::ops::Range;
 
 /// Lines nearer than this, pixels, along the whole of their overlap are one line.
 const SAME_PX: f64 = 1e-3;
+/// Pieces are sorted into the cells that come so near to them, pixels.
+const NEAR_PX: f64 = 2.0 * SAME_PX;
 /// Overlaps and remainders that are shorter, pixels, do not count.
 const SHORTEST_PX: f64 = 1e-6;
 
+/// The longest side of the grid, cells.
+const MOST_CELLS: usize = 4096;
+/// Where a cell has more pieces than this, twins must be suspected.
+const CROWD: u32 = 128;
+
 /// Takes away what is drawn already.
-pub(super) fn draw_once(pieces: &mut Vec<Piece>) {
+pub(super) fn draw_once(crew: Crew, pieces: &mut Vec<Piece>) {
     if pieces.len() < 2 {
         return;
     }
-    let mut cells = Cells::new(pieces);
-    if cells.is_crowded() {
+    let sort = |laid: &Laid| Sorted::new(crew, &laid.grid, laid);
+    let mut cells = sort(&Laid::new(crew, pieces));
+    if cells.most() > CROWD {
         drop_twins(pieces);
-        cells = Cells::new(pieces);
+        cells = sort(&Laid::new(crew, pieces));
     }
-    let lines: Vec<Line> = pieces.iter().map(Line::of).collect();
-    let mut covered = overlaps(&cells, pieces, &lines);
+    let mut lines = Vec::new();
+    crew.extend(&mut lines, pieces.len(), |i| Line::of(&pieces[i]));
+    let shares = crew.shares(cells.len(), 4);
+    let mut covered = crew.map(shares, |range| overlaps(&cells, range, pieces, &lines)).concat();
     if covered.is_empty() {
         return;
     }
@@ -59,10 +71,10 @@ pub(super) fn draw_once(pieces: &mut Vec<Piece>) {
 }
 
 /// Pieces that a more important one lies on, and between which distances; some several times.
-fn overlaps(cells: &Cells, pieces: &[Piece], lines: &[Line]) -> Vec<(u32, f64, f64)> {
+fn overlaps(cells: &Sorted, range: Range<usize>, pieces: &[Piece], lines: &[Line]) -> Vec<(u32, f64, f64)> {
     let mut found = Vec::new();
     let mut here: Vec<(u32, Line)> = Vec::new();
-    for cell in 0..cells.grid.len() {
+    for cell in range {
         here.clear();
         here.extend(cells.in_cell(cell).iter().map(|&i| (i, lines[i as usize])));
         for (k, (i, a)) in here.iter().enumerate() {
@@ -148,61 +160,60 @@ impl Line {
     }
 }
 
-/// Pieces by cell.
-struct Cells {
+/// Pieces on a grid.
+struct Laid<'a> {
     grid: Grid,
-    starts: Vec<u32>,
-    entries: Vec<u32>,
+    pieces: &'a [Piece],
+    /// The first and the last row of each piece.
+    rows: Vec<[u16; 2]>,
 }
 
-impl Cells {
-    fn new(pieces: &[Piece]) -> Cells {
+impl Laid<'_> {
+    fn new(crew: Crew, pieces: &[Piece]) -> Laid<'_> {
         let ends = || pieces.iter().flat_map(|p| p.ends);
         let min = ends().fold(DVec2::INFINITY, DVec2::min);
         let max = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
-        let grid = Grid::over(min, max, ((pieces.len() as f64).sqrt() * 0.7) as usize + 4);
-        let mut cells = Cells { grid, starts: vec![0; grid.len() + 1], entries: Vec::new() };
-        for p in pieces {
-            walk(&grid, p, |cell| cells.starts[cell + 1] += 1);
-        }
-        for i in 1..cells.starts.len() {
-            cells.starts[i] += cells.starts[i - 1];
-        }
-        cells.entries = vec![0; cells.starts[grid.len()] as usize];
-        let mut next = cells.starts.clone();
-        for (i, p) in pieces.iter().enumerate() {
-            walk(&grid, p, |cell| {
-                cells.entries[next[cell] as usize] = i as u32;
-                next[cell] += 1;
-            });
-        }
-        cells
-    }
-
-    /// Whether some cell has so many pieces that twins must be suspected.
-    fn is_crowded(&self) -> bool {
-        self.starts.windows(2).any(|w| w[1] - w[0] > 128)
-    }
-
-    fn in_cell(&self, cell: usize) -> &[u32] {
-        &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+        let grid = Grid::over(min, max, (((pieces.len() as f64).sqrt() * 0.7) as usize + 4).min(MOST_CELLS));
+        let mut rows = Vec::new();
+        crew.extend(&mut rows, pieces.len(), |i| {
+            let [a, b] = pieces[i].ends;
+            [a.y.min(b.y) - NEAR_PX, a.y.max(b.y) + NEAR_PX].map(|y| grid.row(y) as u16)
+        });
+        Laid { grid, pieces, rows }
     }
 }
 
-/// The cells that a piece comes near to, column by column.
-fn walk(grid: &Grid, piece: &Piece, mut visit: impl FnMut(usize)) {
-    let [a, b] = if piece.ends[0].x <= piece.ends[1].x { piece.ends } else { [piece.ends[1], piece.ends[0]] };
-    let near = 2.0 * SAME_PX;
-    let (first, last) = (grid.column(a.x - near), grid.column(b.x + near));
-    for column in first..=last {
-        let left = (grid.origin.x + column as f64 * grid.size - near).max(a.x);
-        let right = (grid.origin.x + (column + 1) as f64 * grid.size + near).min(b.x);
-        let y = |x: f64| {
-            if b.x > a.x { a.y + (b.y - a.y) * ((x - a.x) / (b.x - a.x)).clamp(0.0, 1.0) } else { a.y }
-        };
-        let (y0, y1) = if b.x - a.x > near { (y(left), y(right)) } else { (a.y, b.y) };
-        for row in grid.row(y0.min(y1) - near)..=grid.row(y0.max(y1) + near) {
-            visit(grid.index(column, row));
+impl Places for Laid<'_> {
+    /// The cells that a piece comes near to, column by column.
+    #[inline(always)]
+    fn visit(&self, rows: &Range<usize>, mut visit: impl FnMut(usize, usize)) {
+        let (grid, start) = (&self.grid, self.grid.index(0, rows.start));
+        for (i, of) in self.rows.iter().enumerate() {
+            let [top, bottom] = of.map(usize::from);
+            if top >= rows.end || bottom < rows.start {
+                continue;
+            }
+            let piece = &self.pieces[i];
+            let [a, b] =
+                if piece.ends[0].x <= piece.ends[1].x { piece.ends } else { [piece.ends[1], piece.ends[0]] };
+            let (first, last) = (grid.column(a.x - NEAR_PX), grid.column(b.x + NEAR_PX));
+            let mut visit_column = |column: usize, top: usize, bottom: usize| {
+                for row in top.max(rows.start)..=bottom.min(rows.end - 1) {
+                    visit(grid.index(column, row) - start, i);
+                }
+            };
+            if first == last || top == bottom {
+                (first..=last).for_each(|column| visit_column(column, top, bottom));
+                continue;
+            }
+            let slope = if b.x - a.x > NEAR_PX { (b.y - a.y) / (b.x - a.x) } else { 0.0 };
+            for column in first..=last {
+                let left = (grid.origin.x + column as f64 * grid.size - NEAR_PX).max(a.x);
+                let right = (grid.origin.x + (column + 1) as f64 * grid.size + NEAR_PX).min(b.x);
+                let y = |x: f64| a.y + slope * (x - a.x).clamp(0.0, b.x - a.x);
+                let (y0, y1) = if b.x - a.x > NEAR_PX { (y(left), y(right)) } else { (a.y, b.y) };
+                visit_column(column, grid.row(y0.min(y1) - NEAR_PX), grid.row(y0.max(y1) + NEAR_PX));
+            }
         }
     }
 }
@@ -210,6 +221,8 @@ fn walk(grid: &Grid, piece: &Piece, mut visit: impl FnMut(usize)) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const ONE: Crew = Crew { threads: 1 };
     use crate::hidden_line::Kind;
 
     fn piece(part: u32, a: [f64; 2], b: [f64; 2], kind: Kind, covers: u32) -> Piece {
@@ -228,7 +241,7 @@ mod tests {
             piece(1, [0.0, 0.0], [0.0, 10.0], Kind::Crease, 0),
             piece(0, [0.0, 5.0], [0.0, 20.0], Kind::Silhouette, 0),
         ];
-        draw_once(&mut pieces);
+        draw_once(ONE, &mut pieces);
         assert!((length(&pieces) - 30.0).abs() < 1e-6, "{pieces:?}");
         let visible: Vec<Piece> = pieces.iter().copied().filter(|p| p.covers == 0).collect();
         assert!((length(&visible) - 26.0).abs() < 1e-6);
@@ -237,7 +250,7 @@ mod tests {
     #[test]
     fn a_million_twins_become_one() {
         let mut pieces = vec![piece(3, [1.0, 1.0], [9.0, 5.0], Kind::Crease, 0); 1000];
-        draw_once(&mut pieces);
+        draw_once(ONE, &mut pieces);
         assert_eq!(pieces.len(), 1);
     }
 
@@ -250,7 +263,7 @@ mod tests {
             piece(0, [0.0, 0.01], [10.0, 10.01], Kind::Crease, 0),
         ];
         let before = pieces.clone();
-        draw_once(&mut pieces);
+        draw_once(ONE, &mut pieces);
         assert_eq!(pieces, before);
     }
 }

@@ -23,12 +23,8 @@ pub(super) struct Cover {
     pub grid: Grid,
     /// Whatever has a smaller w, at a point in this cell, is hidden there.
     bound: Vec<f64>,
-    /// Nearest surface of the present solid at a cell's centre: w and triangle.
-    nearest: Vec<(f64, u32)>,
-    touched: Vec<u32>,
-    /// The walk that came to a triangle last.
-    visited: Vec<u32>,
-    walk: u32,
+    /// Nearest surface of the present solid.
+    samples: Samples,
     /// Whether everything in a cell is known: what is not hidden by its bound is seen.
     settled: Vec<bool>,
     /// The triangle that the walk which gave a cell its bound began with.
@@ -40,10 +36,7 @@ impl Cover {
         Cover {
             grid,
             bound: vec![f64::NEG_INFINITY; grid.len()],
-            nearest: vec![(f64::NEG_INFINITY, NONE); grid.len()],
-            touched: Vec::new(),
-            visited: Vec::new(),
-            walk: 0,
+            samples: Samples::new(&grid),
             settled: vec![false; grid.len()],
             seed: vec![NONE; grid.len()],
         }
@@ -66,45 +59,47 @@ impl Cover {
 
     /// Finds the cells in which nothing but the surface that gave them their bound is nearer than it: no line
     /// of this surface is hidden there. Call it when everything is added and sorted.
-    pub fn settle_cells(&mut self, shown: &Shown, occluders: &Occluders, hides: impl Fn(u32) -> bool) {
-        self.visited.clear();
-        self.visited.resize(shown.triangles.len(), 0);
-        self.walk = 0;
-        for cell in 0..self.grid.len() {
-            let seed = self.seed[cell];
-            if seed == NONE {
-                continue;
-            }
-            let solid = &shown.solids[shown.solid_of(seed)];
-            let first = solid.first_triangle as usize;
-            let center = self.grid.center(cell % self.grid.columns, cell / self.grid.columns);
-            let mut visited = std::mem::take(&mut self.visited);
-            let mut walk = Walk {
-                visited: &mut visited[first..],
-                number: self.walk + 1,
-                reach: self.reach(center),
-                center,
-            };
-            let covered = walk.from(shown, solid, seed, &hides).is_some();
-            self.walk += 1;
-            // Around a branch point a surface without folds can cover a cell twice.
-            let mut over_center = 0;
-            let alone = covered
-                && occluders.in_cell(cell).iter().all(|&i| {
-                    let occluder = &occluders.list[i as usize];
-                    if f64::from(occluder.nearest) < self.bound[cell] {
-                        return true;
-                    }
-                    let corners = shown.corners(occluder.triangle);
-                    if visited[occluder.triangle as usize] == self.walk {
-                        over_center += usize::from(contains(&corners, center));
-                        return true;
-                    }
-                    !touches(&corners, center, self.reach(center))
-                });
-            self.visited = visited;
-            self.settled[cell] = alone && over_center <= 1;
+    pub fn settle_cells(&mut self, shown: &Shown, occluders: &Occluders, hides: impl Fn(u32) -> bool + Sync) {
+        let start = || Walks::over(shown.triangles.len());
+        let settled = shown.crew.map_with(shown.crew.ranges(self.grid.len(), 4), start, |walks, cells| {
+            cells.map(|cell| self.is_settled(shown, occluders, &hides, cell, walks)).collect::<Vec<bool>>()
+        });
+        self.settled = settled.concat();
+    }
+
+    fn is_settled(
+        &self,
+        shown: &Shown,
+        occluders: &Occluders,
+        hides: &impl Fn(u32) -> bool,
+        cell: usize,
+        walks: &mut Walks,
+    ) -> bool {
+        let seed = self.seed[cell];
+        if seed == NONE {
+            return false;
         }
+        let solid = &shown.solids[shown.solid_of(seed)];
+        let center = self.grid.center(cell % self.grid.columns, cell / self.grid.columns);
+        let reach = self.reach(center);
+        if walks.next(0, center, reach).from(shown, solid, seed, hides).is_none() {
+            return false;
+        }
+        // Around a branch point a surface without folds can cover a cell twice.
+        let mut over_center = 0;
+        for &i in occluders.in_cell(cell) {
+            let occluder = &occluders.list[i as usize];
+            if f64::from(occluder.nearest) < self.bound[cell] {
+                break;
+            }
+            let corners = shown.corners(occluder.triangle);
+            if walks.visited[occluder.triangle as usize] == walks.last {
+                over_center += usize::from(contains(&corners, center));
+            } else if touches(&corners, center, reach) {
+                return false;
+            }
+        }
+        over_center <= 1
     }
 
     /// Half a cell's side, with room for the rounding of coordinates far outside the picture.
@@ -121,39 +116,77 @@ impl Cover {
     }
 
     /// Lets the last solid of `shown` cover what it covers. Triangles that `hides` says no to are not there.
-    pub fn add(&mut self, shown: &Shown, hides: impl Fn(u32) -> bool) {
+    pub fn add(&mut self, shown: &Shown, hides: impl Fn(u32) -> bool + Sync) {
         let Some(solid) = shown.solids.last() else { return };
-        for t in solid.first_triangle..solid.first_triangle + solid.triangle_count {
-            if shown.fate[t as usize] == Fate::Live && hides(t) {
-                self.sample(shown, t);
-            }
+        let first = solid.first_triangle;
+        let count = solid.triangle_count as usize;
+        let mut samples = std::mem::take(&mut self.samples);
+        let mut work = Vec::new();
+        for (k, range) in shown.crew.shares(count, 1).into_iter().enumerate() {
+            let samples = if k == 0 { std::mem::take(&mut samples) } else { Samples::new(&self.grid) };
+            work.push((samples, first + range.start as u32..first + range.end as u32));
         }
-        self.visited.clear();
-        self.visited.resize(solid.triangle_count as usize, 0);
-        self.walk = 0;
-        for at in std::mem::take(&mut self.touched) {
-            let (w, triangle) = std::mem::replace(&mut self.nearest[at as usize], (f64::NEG_INFINITY, NONE));
-            if w <= self.bound[at as usize] {
-                continue;
-            }
-            let cell = at as usize;
-            let center = self.grid.center(cell % self.grid.columns, cell / self.grid.columns);
-            let reach = self.reach(center);
-            self.walk += 1;
-            let mut walk = Walk { visited: &mut self.visited, number: self.walk, reach, center };
-            if let Some(farthest) = walk.from(shown, solid, triangle, &hides) {
-                let bound = farthest - shown.lens.coarse(farthest);
-                if bound > self.bound[cell] {
-                    self.bound[cell] = bound;
-                    self.seed[cell] = triangle;
+        let filled = shown.crew.map(work, |(mut samples, range)| {
+            for t in range {
+                if shown.fate[t as usize] == Fate::Live && hides(t) {
+                    samples.take(shown, &self.grid, &self.bound, t);
                 }
             }
+            samples
+        });
+        for samples_of_share in filled {
+            samples.merge(samples_of_share);
         }
+        let touched = std::mem::take(&mut samples.touched);
+        let shares = shown.crew.shares(touched.len(), 4);
+        let found = shown.crew.map_with(
+            shares,
+            || Walks::over(count),
+            |walks, range| {
+                let mut found = Vec::new();
+                for &at in &touched[range] {
+                    let (w, triangle) = samples.nearest[at as usize];
+                    if w <= self.bound[at as usize] {
+                        continue;
+                    }
+                    let cell = at as usize;
+                    let center = self.grid.center(cell % self.grid.columns, cell / self.grid.columns);
+                    let mut walk = walks.next(first, center, self.reach(center));
+                    let farthest = walk.from(shown, solid, triangle, &hides);
+                    found.extend(farthest.map(|w| (at, w - shown.lens.coarse(w), triangle)));
+                }
+                found
+            },
+        );
+        for (at, bound, triangle) in found.into_iter().flatten() {
+            if bound > self.bound[at as usize] {
+                self.bound[at as usize] = bound;
+                self.seed[at as usize] = triangle;
+            }
+        }
+        touched.iter().for_each(|&at| samples.nearest[at as usize] = NO_SAMPLE);
+        self.samples = samples;
+    }
+}
+
+/// What is nearest of a solid at the centres of cells.
+#[derive(Default)]
+struct Samples {
+    /// w and triangle.
+    nearest: Vec<(f64, u32)>,
+    /// The cells that have a triangle.
+    touched: Vec<u32>,
+}
+
+const NO_SAMPLE: (f64, u32) = (f64::NEG_INFINITY, NONE);
+
+impl Samples {
+    fn new(grid: &Grid) -> Samples {
+        Samples { nearest: vec![NO_SAMPLE; grid.len()], touched: Vec::new() }
     }
 
-    /// Notes a triangle at the centres that it covers, if it is the nearest there.
-    fn sample(&mut self, shown: &Shown, triangle: u32) {
-        let grid = self.grid;
+    /// Notes a triangle at the centres that it covers, if it is the nearest there and before `bound`.
+    fn take(&mut self, shown: &Shown, grid: &Grid, bound: &[f64], triangle: u32) {
         let [a, b, c] = shown.corners(triangle);
         let (min, max) = rectangle([a, b, c]);
         let last = grid.origin + DVec2::new(grid.columns as f64, grid.rows as f64) * grid.size;
@@ -174,21 +207,57 @@ impl Cover {
                 }
                 let at = grid.index(column, row);
                 let w = plane.at(center).min(a.z.max(b.z).max(c.z));
-                if w > self.bound[at] && w > self.nearest[at].0 {
-                    if self.nearest[at].1 == NONE {
-                        self.touched.push(at as u32);
-                    }
-                    self.nearest[at] = (w, triangle);
+                if w > bound[at] {
+                    self.note(at as u32, (w, triangle));
                 }
             }
         }
+    }
+
+    fn note(&mut self, at: u32, sample: (f64, u32)) {
+        let nearest = &mut self.nearest[at as usize];
+        if sample.0 > nearest.0 {
+            if nearest.1 == NONE {
+                self.touched.push(at);
+            }
+            *nearest = sample;
+        }
+    }
+
+    /// Takes over another share's; of the same depth the earlier stays.
+    fn merge(&mut self, other: Samples) {
+        if self.nearest.is_empty() {
+            *self = other;
+            return;
+        }
+        other.touched.iter().for_each(|&at| self.note(at, other.nearest[at as usize]));
+    }
+}
+
+/// Walks by one thread.
+struct Walks {
+    /// The walk that came to a triangle last.
+    visited: Vec<u32>,
+    last: u32,
+}
+
+impl Walks {
+    fn over(triangles: usize) -> Walks {
+        Walks { visited: vec![0; triangles], last: 0 }
+    }
+
+    /// Begins a walk over a cell; `first` is the first triangle that may be visited.
+    fn next(&mut self, first: u32, center: DVec2, reach: f64) -> Walk<'_> {
+        self.last += 1;
+        Walk { visited: &mut self.visited, first, number: self.last, center, reach }
     }
 }
 
 /// A walk over one cell.
 struct Walk<'a> {
-    /// For each triangle of the solid, the walk that came to it last.
+    /// The walk that came to a triangle last, from `first` on.
     visited: &'a mut [u32],
+    first: u32,
     number: u32,
     center: DVec2,
     reach: f64,
@@ -206,7 +275,7 @@ impl Walk<'_> {
         let mut farthest = f64::INFINITY;
         let mut stack = [triangle; LONGEST_WALK];
         let (mut height, mut steps) = (1, 0);
-        self.visited[(triangle - solid.first_triangle) as usize] = self.number;
+        self.visited[(triangle - self.first) as usize] = self.number;
         while height > 0 {
             height -= 1;
             steps += 1;
@@ -223,7 +292,7 @@ impl Walk<'_> {
                 if !hides(next) {
                     return None;
                 }
-                let seen = &mut self.visited[(next - solid.first_triangle) as usize];
+                let seen = &mut self.visited[(next - self.first) as usize];
                 if *seen != self.number {
                     *seen = self.number;
                     if height == LONGEST_WALK || steps + height >= LONGEST_WALK {
@@ -329,18 +398,22 @@ impl Plane {
 
 /// Marks what cannot be seen: triangles outside the picture, and those that `cover` hides.
 pub(super) fn settle(shown: &mut Shown, cover: Option<&Cover>, picture: DVec2) {
-    for t in 0..shown.triangles.len() {
+    let fate = |t: usize| {
         if shown.fate[t] != Fate::Live {
-            continue;
+            return shown.fate[t];
         }
         let [a, b, c] = shown.corners(t as u32);
         let (min, max) = rectangle([a, b, c]);
-        let outside = max.x < 0.0 || max.y < 0.0 || min.x > picture.x || min.y > picture.y;
         let nearest = a.z.max(b.z).max(c.z);
-        if outside {
-            shown.fate[t] = Fate::Outside;
+        if max.x < 0.0 || max.y < 0.0 || min.x > picture.x || min.y > picture.y {
+            Fate::Outside
         } else if cover.is_some_and(|cover| cover.hides(cover.grid.cells(min, max), nearest)) {
-            shown.fate[t] = Fate::Hidden;
+            Fate::Hidden
+        } else {
+            Fate::Live
         }
-    }
+    };
+    let mut fates = Vec::new();
+    shown.crew.extend(&mut fates, shown.triangles.len(), fate);
+    shown.fate = fates;
 }

@@ -3,6 +3,7 @@
 use super::caps;
 use super::coincident;
 use super::cover::{self, Cover};
+use super::crew::Crew;
 use super::drawing::{Counters, Drawing, Face, Kind};
 use super::edges::Choice;
 use super::faces;
@@ -19,7 +20,6 @@ use super::{FaceColor, Kinds, LineOptions, Preparation};
 use crate::conventions::{View, ViewError};
 use crate::geometry::Aabb;
 use glam::{DAffine3, DVec2, DVec3};
-use rayon::prelude::*;
 
 /// Edges that one thread traces at a time.
 const CHUNK: usize = 4096;
@@ -56,16 +56,16 @@ impl Preparation {
             n => n,
         };
         if threads == 1 {
-            return Ok(self.drawing(view, options, false));
+            return Ok(self.drawing(view, options, Crew { threads }));
         }
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         Ok(match pool {
-            Ok(pool) => pool.install(|| self.drawing(view, options, true)),
-            Err(_) => self.drawing(view, options, false),
+            Ok(pool) => pool.install(|| self.drawing(view, options, Crew { threads })),
+            Err(_) => self.drawing(view, options, Crew { threads: 1 }),
         })
     }
 
-    fn drawing(&self, view: &View, options: &LineOptions, parallel: bool) -> Drawing {
+    fn drawing(&self, view: &View, options: &LineOptions, crew: Crew) -> Drawing {
         let lens = Lens::new(view, self.tolerance);
         let picture = DVec2::new(f64::from(view.width), f64::from(view.height));
         let planes = planes(view, options);
@@ -74,7 +74,8 @@ impl Preparation {
             instances_culled: (self.instances.len() - placed.len()) as u64,
             ..Counters::default()
         };
-        let (shown, mut cover) = self.show(lens, planes, &placed, options, picture, &mut counters);
+        let (shown, mut cover) =
+            self.show(Shown::new(crew, lens, planes), &placed, options, picture, &mut counters);
         let grid =
             cover.as_ref().map_or_else(|| grid_over(&placed, picture, shown.triangles.len()), |c| c.grid);
         let see_through = see_through(&shown, options);
@@ -91,15 +92,15 @@ impl Preparation {
             picture,
             counts: options.hidden,
         };
-        let mut pieces = trace_edges(&tracer, options, parallel, &mut counters);
+        let mut pieces = trace_edges(&tracer, options, &mut counters);
         if options.kinds.intersection || options.kinds.contact || !shown.sections.is_empty() {
-            intersections::add(&tracer, options, parallel, &mut pieces, &mut counters);
+            intersections::add(&tracer, options, &mut pieces, &mut counters);
         }
-        let faces = find_faces(&tracer, options, parallel, &mut pieces);
+        let faces = find_faces(&tracer, options, &mut pieces);
         counters.segments = pieces.len() as u64;
         counters.visible_segments = pieces.iter().filter(|p| p.covers == 0).count() as u64;
-        coincident::draw_once(&mut pieces);
-        let (points, strokes) = strokes::join(pieces);
+        coincident::draw_once(crew, &mut pieces);
+        let (points, strokes) = strokes::join(crew, pieces);
         Drawing { width: picture.x, height: picture.y, points, strokes, faces, counters }
     }
 
@@ -122,14 +123,12 @@ impl Preparation {
     /// Projects what may be seen, and learns on the way what cannot.
     fn show<'p>(
         &'p self,
-        lens: Lens,
-        planes: Vec<HalfSpace>,
+        mut shown: Shown<'p>,
         placed: &[Placed],
         options: &LineOptions,
         picture: DVec2,
         counters: &mut Counters,
     ) -> (Shown<'p>, Option<Cover>) {
-        let mut shown = Shown::new(lens, planes);
         let triangles: usize = placed.iter().map(|p| self.meshes[p.mesh as usize].triangles.len()).sum();
         let mut cover = (!options.hidden).then(|| Cover::new(grid_over(placed, picture, triangles)));
         for p in placed {
@@ -230,12 +229,7 @@ fn grid_over(placed: &[Placed], picture: DVec2, triangles: usize) -> Grid {
 }
 
 /// Follows every edge that is to be drawn.
-fn trace_edges(
-    tracer: &Tracer,
-    options: &LineOptions,
-    parallel: bool,
-    counters: &mut Counters,
-) -> Vec<Piece> {
+fn trace_edges(tracer: &Tracer, options: &LineOptions, counters: &mut Counters) -> Vec<Piece> {
     let choice = Choice::new(options.kinds, options.crease_angle, options.hidden);
     let shown = tracer.shown;
     let mut work = Vec::new();
@@ -245,11 +239,11 @@ fn trace_edges(
     }
     let see_through = see_through(shown, options);
     let hides = |t: u32| !see_through(t);
-    let trace = |scratch: &mut Scratch, (s, range): &(usize, std::ops::Range<usize>)| {
-        let solid = &shown.solids[*s];
+    let trace = |scratch: &mut Scratch, (s, range): (usize, std::ops::Range<usize>)| {
+        let solid = &shown.solids[s];
         let mut pieces = Vec::new();
         let mut lines = 0;
-        for edge in &solid.topology.edges[range.clone()] {
+        for edge in &solid.topology.edges[range] {
             let Some(kind) = choice.kind(shown, solid, edge) else { continue };
             let Some(ends) = shown.edge(solid, edge.vertices) else { continue };
             let [p, q] = ends.map(|v| shown.screen[v as usize]);
@@ -270,13 +264,7 @@ fn trace_edges(
         }
         (pieces, lines, std::mem::take(&mut scratch.tests))
     };
-    let new_scratch = || Scratch::new(tracer.occluders);
-    let found: Vec<_> = if parallel {
-        work.par_iter().map_init(new_scratch, trace).collect()
-    } else {
-        let mut scratch = new_scratch();
-        work.iter().map(|w| trace(&mut scratch, w)).collect()
-    };
+    let found = shown.crew.map_with(work, || Scratch::new(tracer.occluders), trace);
     let mut all = Vec::with_capacity(found.iter().map(|f| f.0.len()).sum());
     for (pieces, lines, tests) in found {
         all.extend(pieces);
@@ -287,15 +275,15 @@ fn trace_edges(
 }
 
 /// The visible faces, if they are asked for, and hatching of them among the pieces.
-fn find_faces(tracer: &Tracer, options: &LineOptions, parallel: bool, pieces: &mut Vec<Piece>) -> Vec<Face> {
+fn find_faces(tracer: &Tracer, options: &LineOptions, pieces: &mut Vec<Piece>) -> Vec<Face> {
     if options.faces.is_none() && options.hatch.is_none() {
         return Vec::new();
     }
     // All lines bound faces, whichever of them are drawn.
     let all = LineOptions { kinds: Kinds::ALL, crease_angle: 0.0, ..options.clone() };
     let mut aside = Counters::default();
-    let mut bounds = trace_edges(tracer, &all, parallel, &mut aside);
-    intersections::add(tracer, &all, parallel, &mut bounds, &mut aside);
+    let mut bounds = trace_edges(tracer, &all, &mut aside);
+    intersections::add(tracer, &all, &mut bounds, &mut aside);
     intersections::add_sections(tracer, true, &mut bounds, &mut aside);
     if let Some(spacing) = options.hatch {
         pieces.extend(hatch::lines(&faces::find(tracer, &bounds, FaceColor::Flat), spacing));

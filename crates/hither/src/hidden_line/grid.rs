@@ -1,6 +1,8 @@
 //! A grid of square cells over the part of the paper that is drawn on.
 
+use super::crew::Crew;
 use glam::{DVec2, DVec3};
+use std::ops::Range;
 
 /// Cells of `size` pixels from `origin` on, row by row.
 #[derive(Clone, Copy, Debug)]
@@ -62,6 +64,74 @@ impl Grid {
 
     pub fn center(&self, column: usize, row: usize) -> DVec2 {
         self.origin + DVec2::new(column as f64 + 0.5, row as f64 + 0.5) * self.size
+    }
+}
+
+/// Things to be sorted into the cells of a grid.
+pub(super) trait Places: Sync {
+    /// Calls `visit` for every thing and every cell of these rows that it belongs to, things in order; cells
+    /// are counted from the first of the rows.
+    fn visit(&self, rows: &Range<usize>, visit: impl FnMut(usize, usize));
+}
+
+/// Things by cell, each cell's in order.
+#[derive(Debug)]
+pub(super) struct Sorted {
+    starts: Vec<u32>,
+    entries: Vec<u32>,
+}
+
+impl Sorted {
+    /// Visits all things twice: to count them, and to put them in their places.
+    pub fn new(crew: Crew, grid: &Grid, places: &impl Places) -> Sorted {
+        let bands = crew.ranges(grid.rows, 1);
+        let cells = |rows: &Range<usize>| grid.index(0, rows.start)..grid.index(0, rows.end);
+        let counts = crew.map(bands.clone(), |rows| {
+            let mut counts = vec![0u32; cells(&rows).len()];
+            places.visit(&rows, |cell, _| counts[cell] += 1);
+            counts
+        });
+        let mut starts = Vec::with_capacity(grid.len() + 1);
+        let mut sum = 0;
+        starts.push(0);
+        for count in counts.iter().flatten() {
+            sum += count;
+            starts.push(sum);
+        }
+        let mut entries = vec![0u32; sum as usize];
+        let mut rest = &mut entries[..];
+        let mut work = Vec::new();
+        for rows in bands {
+            let length = starts[cells(&rows).end] - starts[cells(&rows).start];
+            let (own, others) = rest.split_at_mut(length as usize);
+            work.push((rows, own));
+            rest = others;
+        }
+        crew.map(work, |(rows, own)| {
+            let cells = cells(&rows);
+            let mut next: Vec<u32> = starts[cells.clone()].iter().map(|s| s - starts[cells.start]).collect();
+            places.visit(&rows, |cell, thing| {
+                own[next[cell] as usize] = thing as u32;
+                next[cell] += 1;
+            });
+        });
+        Sorted { starts, entries }
+    }
+
+    /// A cell's things.
+    #[inline]
+    pub fn in_cell(&self, cell: usize) -> &[u32] {
+        &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+
+    /// The number of cells.
+    pub fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The most things that a cell has.
+    pub fn most(&self) -> u32 {
+        self.starts.windows(2).map(|w| w[1] - w[0]).max().unwrap_or_default()
     }
 }
 

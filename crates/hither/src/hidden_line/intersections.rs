@@ -14,7 +14,6 @@ use super::topology::{Mix, NONE};
 use super::trace::{NO_SHEET, Own, Scratch, Tracer};
 use super::{Kinds, LineOptions};
 use glam::DVec3;
-use rayon::prelude::*;
 use std::collections::HashSet;
 use std::ops::Range;
 
@@ -38,20 +37,15 @@ struct Meeting {
 
 /// Finds the lines in which the live triangles meet, and those of sections; follows them, and adds their
 /// parts to `pieces`. Cost: the pairs of triangles that overlap on the paper and in depth.
-pub(super) fn add(
-    tracer: &Tracer,
-    options: &LineOptions,
-    parallel: bool,
-    pieces: &mut Vec<Piece>,
-    counters: &mut Counters,
-) {
+pub(super) fn add(tracer: &Tracer, options: &LineOptions, pieces: &mut Vec<Piece>, counters: &mut Counters) {
     let kinds = &options.kinds;
     let wanted = kinds.intersection || kinds.contact;
-    let planes: Vec<Plane> = match wanted {
-        true => tracer.occluders.list.iter().map(|o| Plane::of(tracer.shown, o.triangle)).collect(),
-        false => Vec::new(),
-    };
-    let meetings = meetings(tracer, kinds, &planes, parallel);
+    let (crew, list) = (tracer.shown.crew, &tracer.occluders.list);
+    let mut planes = Vec::new();
+    if wanted {
+        crew.extend(&mut planes, list.len(), |i| Plane::of(tracer.shown, list[i].triangle));
+    }
+    let meetings = meetings(tracer, kinds, &planes);
     let of_chunk = |scratch: &mut Scratch, chunk: &[Meeting]| {
         let mut pieces = Vec::new();
         for meeting in chunk {
@@ -75,13 +69,8 @@ pub(super) fn add(
         }
         (pieces, std::mem::take(&mut scratch.tests))
     };
-    let new_scratch = || Scratch::new(tracer.occluders);
-    let found: Vec<_> = if parallel {
-        meetings.par_chunks(CHUNK).map_init(new_scratch, of_chunk).collect()
-    } else {
-        let mut scratch = new_scratch();
-        meetings.chunks(CHUNK).map(|chunk| of_chunk(&mut scratch, chunk)).collect()
-    };
+    let chunks = meetings.chunks(CHUNK).collect();
+    let found = crew.map_with(chunks, || Scratch::new(tracer.occluders), of_chunk);
     counters.lines += meetings.len() as u64;
     for (more, tests) in found {
         pieces.extend(more);
@@ -91,7 +80,7 @@ pub(super) fn add(
 }
 
 /// The meetings of the kinds that are wanted, each once.
-fn meetings(tracer: &Tracer, kinds: &Kinds, planes: &[Plane], parallel: bool) -> Vec<Meeting> {
+fn meetings(tracer: &Tracer, kinds: &Kinds, planes: &[Plane]) -> Vec<Meeting> {
     if planes.is_empty() {
         return Vec::new();
     }
@@ -102,11 +91,7 @@ fn meetings(tracer: &Tracer, kinds: &Kinds, planes: &[Plane], parallel: bool) ->
         meetings_in_rows(tracer, planes, rows, &mut found);
         found
     };
-    let found: Vec<Vec<Meeting>> = if parallel {
-        (0..BANDS).into_par_iter().map(of_band).collect()
-    } else {
-        (0..BANDS).map(of_band).collect()
-    };
+    let found = tracer.shown.crew.map((0..BANDS).collect(), of_band);
     let mut known: HashSet<[u32; 2], Mix> = HashSet::default();
     let mut all: Vec<Meeting> = found.into_iter().flatten().collect();
     all.retain(|m| {

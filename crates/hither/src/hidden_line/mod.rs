@@ -27,6 +27,7 @@ mod bodies;
 mod caps;
 mod coincident;
 mod cover;
+mod crew;
 mod draw;
 mod drawing;
 mod edges;

@@ -1,16 +1,16 @@
 //! The triangles that may hide something, by cell of the grid, nearest first.
 
 use super::cover::Cover;
-use super::grid::{Grid, rectangle};
+use super::grid::{Grid, Places, Sorted, rectangle};
 use super::shown::{Fate, Shown};
 use super::topology::NONE;
 use glam::{DVec2, DVec3, Vec4, Vec4Swizzles};
+use std::ops::Range;
 
 /// Triangles by cell.
 pub(super) struct Occluders {
     pub grid: Grid,
-    starts: Vec<u32>,
-    entries: Vec<u32>,
+    cells: Sorted,
     /// The triangles, nearest first.
     pub list: Vec<Occluder>,
     /// Which of them are so large that they are left out of cells that only their box touches.
@@ -89,79 +89,104 @@ impl Occluder {
 impl Occluders {
     /// Sorts the live triangles of `shown` that `hides` says yes to.
     /// Large ones are left out of cells where `cover` hides them.
-    pub fn new(shown: &Shown, grid: Grid, cover: Option<&Cover>, hides: impl Fn(u32) -> bool) -> Occluders {
-        let (list, large) = sorted(shown, &grid, hides);
-        let mut starts = vec![0u32; grid.len() + 1];
-        let hidden = |i: usize, cell: usize| {
-            large[i] && cover.is_some_and(|c| c.bound(cell) > f64::from(list[i].nearest))
+    pub fn new(
+        shown: &Shown,
+        grid: Grid,
+        cover: Option<&Cover>,
+        hides: impl Fn(u32) -> bool + Sync,
+    ) -> Occluders {
+        let list = sorted(shown, hides);
+        let mut cells = Vec::new();
+        let cells_of = |i: usize| {
+            let o: &Occluder = &list[i];
+            let cells = grid.cells(o.bounds.min(), o.bounds.max());
+            [cells.columns.0, cells.columns.1, cells.rows.0, cells.rows.1].map(|n| n as u16)
         };
-        for (i, o) in list.iter().enumerate() {
-            let count = |cell: usize| starts[cell + 1] += u32::from(!hidden(i, cell));
-            visit_cells(shown, &grid, o, large[i], count);
-        }
-        for i in 1..starts.len() {
-            starts[i] += starts[i - 1];
-        }
-        let mut entries = vec![0u32; starts[grid.len()] as usize];
-        let mut next = starts.clone();
-        for (i, o) in list.iter().enumerate() {
-            visit_cells(shown, &grid, o, large[i], |cell| {
-                if hidden(i, cell) {
-                    return;
-                }
-                entries[next[cell] as usize] = i as u32;
-                next[cell] += 1;
-            });
-        }
-        Occluders { grid, starts, entries, list, large }
+        shown.crew.extend(&mut cells, list.len(), cells_of);
+        let binning = Binning { shown, grid: &grid, cover, list: &list, cells: &cells };
+        let sorted = Sorted::new(shown.crew, &grid, &binning);
+        let large = cells.iter().map(is_large).collect();
+        Occluders { grid, cells: sorted, list, large }
     }
 
     /// Indices into [`Occluders::list`] of a cell's triangles, nearest first.
     #[inline]
     pub fn in_cell(&self, cell: usize) -> &[u32] {
-        &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+        self.cells.in_cell(cell)
     }
 }
 
-/// The live triangles that may hide, nearest first, and which of them are large.
-fn sorted(shown: &Shown, grid: &Grid, hides: impl Fn(u32) -> bool) -> (Vec<Occluder>, Vec<bool>) {
+/// Whether a triangle in these cells is left out of those that only its box touches.
+fn is_large(&[left, right, top, bottom]: &[u16; 4]) -> bool {
+    right - left > 1 && bottom - top > 1
+}
+
+/// The live triangles that may hide, nearest first.
+fn sorted(shown: &Shown, hides: impl Fn(u32) -> bool + Sync) -> Vec<Occluder> {
     let live = |t: &u32| shown.fate[*t as usize] == Fate::Live && hides(*t);
-    let mut found = Vec::new();
+    let crew = shown.crew;
+    let mut work = Vec::new();
     for solid in &shown.solids {
-        for t in (solid.first_triangle..solid.first_triangle + solid.triangle_count).filter(live) {
-            let sheet = shown.sheet(solid, t).unwrap_or(NONE);
-            found.push(Occluder::new(&shown.corners(t), t, sheet));
-        }
+        let first = solid.first_triangle as usize;
+        work.extend(crew.shares(solid.triangle_count as usize, 4).into_iter().map(|r| (solid, first, r)));
     }
+    let mut found: Vec<Occluder> = Vec::with_capacity(shown.triangles.len() / 2);
+    let shares = crew.map(work, |(solid, first, range)| {
+        let triangles = (range.start + first) as u32..(range.end + first) as u32;
+        let sheet = |t: u32| shown.sheet(solid, t).unwrap_or(NONE);
+        triangles.filter(live).map(|t| Occluder::new(&shown.corners(t), t, sheet(t))).collect::<Vec<_>>()
+    });
+    shares.into_iter().for_each(|share| found.extend(share));
     let caps = (shown.triangles.len() - shown.caps.len()) as u32..shown.triangles.len() as u32;
     found.extend(caps.filter(live).map(|t| Occluder::new(&shown.corners(t), t, NONE)));
     // Negated and mapped to integers in the same order; then by triangle.
-    let mut order: Vec<u64> = (0..found.len() as u64)
-        .map(|i| {
-            let bits = (-found[i as usize].nearest).to_bits();
-            let rising = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
-            u64::from(rising) << 32 | i
-        })
-        .collect();
-    order.sort_unstable();
-    let list: Vec<Occluder> = order.iter().map(|&key| found[key as u32 as usize]).collect();
-    let is_large = |o: &Occluder| {
-        let cells = grid.cells(o.bounds.min(), o.bounds.max());
-        cells.columns.1 - cells.columns.0 > 1 && cells.rows.1 - cells.rows.0 > 1
+    let key = |i: usize| {
+        let bits = (-found[i].nearest).to_bits();
+        let rising = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
+        u64::from(rising) << 32 | i as u64
     };
-    let large = list.iter().map(is_large).collect();
-    (list, large)
+    let mut order = Vec::new();
+    crew.extend(&mut order, found.len(), key);
+    crew.sort_by_key(&mut order, |key| *key);
+    let mut list = Vec::new();
+    crew.extend(&mut list, order.len(), |i| found[order[i] as u32 as usize]);
+    list
 }
 
-/// Calls `visit` for every cell that a triangle may touch. Errs towards yes.
-#[inline]
-fn visit_cells(shown: &Shown, grid: &Grid, o: &Occluder, large: bool, mut visit: impl FnMut(usize)) {
-    let cells = grid.cells(o.bounds.min(), o.bounds.max());
-    for row in cells.rows.0..=cells.rows.1 {
-        let (first, last) =
-            if large { columns_in_row(&shown.corners(o.triangle), grid, row) } else { cells.columns };
-        for column in first..=last {
-            visit(grid.index(column, row));
+/// What is sorted into cells.
+struct Binning<'a> {
+    shown: &'a Shown<'a>,
+    grid: &'a Grid,
+    cover: Option<&'a Cover>,
+    list: &'a [Occluder],
+    /// The first and last column and the first and last row of each.
+    cells: &'a [[u16; 4]],
+}
+
+impl Places for Binning<'_> {
+    /// The cells that a triangle may touch, and is not certainly hidden in. Errs towards yes.
+    #[inline(always)]
+    fn visit(&self, rows: &Range<usize>, mut visit: impl FnMut(usize, usize)) {
+        let (grid, start) = (self.grid, self.grid.index(0, rows.start));
+        for (i, of) in self.cells.iter().enumerate() {
+            let [left, right, top, bottom] = of.map(usize::from);
+            if top >= rows.end || bottom < rows.start {
+                continue;
+            }
+            let large = is_large(of);
+            for row in top.max(rows.start)..=bottom.min(rows.end - 1) {
+                if !large {
+                    (left..=right).for_each(|column| visit(grid.index(column, row) - start, i));
+                    continue;
+                }
+                let o = &self.list[i];
+                let (first, last) = columns_in_row(&self.shown.corners(o.triangle), grid, row);
+                for cell in grid.index(first, row)..=grid.index(last, row) {
+                    if self.cover.is_none_or(|c| c.bound(cell) <= f64::from(o.nearest)) {
+                        visit(cell - start, i);
+                    }
+                }
+            }
         }
     }
 }

@@ -5,6 +5,7 @@
 //! at the cut edge, so that neighbours stay neighbours.
 
 use super::bodies::{Body, Paper};
+use super::crew::Crew;
 use super::lens::{HalfSpace, Lens};
 use super::predicates::orientation;
 use super::topology::{Mix, NONE, Topology};
@@ -61,6 +62,7 @@ pub(super) struct Cut {
 /// Everything that may be seen, in view space and on the paper.
 #[derive(Debug)]
 pub(super) struct Shown<'p> {
+    pub crew: Crew,
     pub lens: Lens,
     pub planes: Vec<HalfSpace>,
     pub solids: Vec<Solid<'p>>,
@@ -94,8 +96,9 @@ pub(super) struct SectionLine {
 }
 
 impl<'p> Shown<'p> {
-    pub fn new(lens: Lens, planes: Vec<HalfSpace>) -> Shown<'p> {
+    pub fn new(crew: Crew, lens: Lens, planes: Vec<HalfSpace>) -> Shown<'p> {
         Shown {
+            crew,
             lens,
             planes,
             solids: Vec::new(),
@@ -114,24 +117,26 @@ impl<'p> Shown<'p> {
     pub fn add(&mut self, topology: &'p Topology, part: u32, view_from_mesh: &DAffine3, cut: bool) {
         let first_vertex = self.in_view.len() as u32;
         let first_triangle = self.triangles.len() as u32;
-        self.in_view.extend(topology.positions.iter().map(|p| view_from_mesh.transform_point3(p.as_dvec3())));
+        let crew = self.crew;
+        crew.extend(&mut self.in_view, topology.positions.len(), |v| {
+            view_from_mesh.transform_point3(topology.positions[v].as_dvec3())
+        });
         let cut = if cut { self.clip(topology, first_vertex) } else { None };
         if cut.is_none() {
             let global = |v: u32| if v == NONE { NONE } else { v + first_vertex };
-            self.triangles.extend(topology.triangles.iter().map(|t| t.map(global)));
+            let triangle = |t: usize| topology.triangles[t].map(global);
+            crew.extend(&mut self.triangles, topology.triangles.len(), triangle);
         }
         let lens = self.lens;
         let fresh = &self.in_view[first_vertex as usize..];
-        self.screen.extend(fresh.iter().map(|&p| lens.project(p)));
-        let fresh = self.triangles.len() - first_triangle as usize;
-        self.facing.reserve(fresh);
-        self.fate.reserve(fresh);
-        for &[a, b, c] in &self.triangles[first_triangle as usize..] {
-            let at = |v: u32| self.screen[v as usize];
-            let facing = if a == NONE { 0 } else { orientation([at(a), at(b), at(c)]) };
-            self.facing.push(facing);
-            self.fate.push(if facing == 0 { Fate::EdgeOn } else { Fate::Live });
-        }
+        crew.extend(&mut self.screen, fresh.len(), |v| lens.project(fresh[v]));
+        let (fresh, screen) = (&self.triangles[first_triangle as usize..], &self.screen);
+        crew.extend(&mut self.facing, fresh.len(), |t| match fresh[t] {
+            [NONE, ..] => 0,
+            corners => orientation(corners.map(|v| screen[v as usize])),
+        });
+        let facing = &self.facing[first_triangle as usize..];
+        self.fate.extend(facing.iter().map(|&f| if f == 0 { Fate::EdgeOn } else { Fate::Live }));
         self.solids.push(Solid {
             topology,
             part,
@@ -172,7 +177,7 @@ impl<'p> Shown<'p> {
             front: &front,
             centers: &centers,
         };
-        self.sheets.extend(bodies.sheets(solid.topology, &paper));
+        self.sheets.extend(bodies.sheets(self.crew, solid.topology, &paper));
     }
 
     /// Clips all triangles of the mesh; `None` if nothing is cut.

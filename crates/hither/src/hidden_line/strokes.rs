@@ -5,6 +5,7 @@
 //! with another stroke are taken into it. So a connected figure with 2n odd points takes n strokes, or one if
 //! there are none: no drawing of it takes fewer (Euler).
 
+use super::crew::Crew;
 use super::draw::Piece;
 use super::drawing::Stroke;
 use super::topology::{Mix, NONE};
@@ -17,17 +18,20 @@ const JOIN_PER_PX: f64 = 32_768.0;
 const STRAIGHT_PX: f64 = 1e-5;
 
 /// Joins all pieces; returns the points and the strokes, grouped.
-pub(super) fn join(mut pieces: Vec<Piece>) -> (Vec<DVec2>, Vec<Stroke>) {
+pub(super) fn join(crew: Crew, mut pieces: Vec<Piece>) -> (Vec<DVec2>, Vec<Stroke>) {
     let group = |p: &Piece| (p.part, p.covers, p.kind);
     if !pieces.is_sorted_by_key(group) {
-        pieces.sort_by_key(group);
+        crew.sort_by_key(&mut pieces, group);
     }
     let mut points = Vec::new();
     let mut strokes = Vec::new();
-    for run in pieces.chunk_by(|a, b| group(a) == group(b)) {
-        let joints = Joints::of(run);
-        let mut trails = joints.trails(run);
+    let runs: Vec<&[Piece]> = pieces.chunk_by(|a, b| group(a) == group(b)).collect();
+    let joined = crew.map(runs.clone(), |run| {
+        let mut trails = Joints::of(run).trails(run);
         order(&mut trails);
+        trails
+    });
+    for (run, trails) in runs.into_iter().zip(joined) {
         for trail in trails {
             let start = points.len() as u32;
             points.extend(trail);
@@ -356,6 +360,8 @@ impl Nearby {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const ONE: Crew = Crew { threads: 1 };
     use crate::hidden_line::Kind;
 
     fn figure(segments: &[([f64; 2], [f64; 2])]) -> Vec<Piece> {
@@ -378,13 +384,16 @@ mod tests {
 
     #[test]
     fn a_square_is_one_closed_stroke_of_five_points() {
-        let (points, strokes) = join(figure(&[
-            ([0., 0.], [1., 0.]),
-            ([1., 0.], [2., 0.]),
-            ([2., 2.], [2., 0.]),
-            ([2., 2.], [0., 2.]),
-            ([0., 0.], [0., 2.]),
-        ]));
+        let (points, strokes) = join(
+            ONE,
+            figure(&[
+                ([0., 0.], [1., 0.]),
+                ([1., 0.], [2., 0.]),
+                ([2., 2.], [2., 0.]),
+                ([2., 2.], [0., 2.]),
+                ([0., 0.], [0., 2.]),
+            ]),
+        );
         assert_eq!(strokes.len(), 1);
         assert_eq!(points.len(), 5);
         assert_eq!(points[0], points[4]);
@@ -400,7 +409,7 @@ mod tests {
             segments.push(([x + 2., 0.], [x + 1., 1.]));
             segments.push(([x + 1., 1.], [x, 0.]));
         }
-        let (points, strokes) = join(figure(&segments));
+        let (points, strokes) = join(ONE, figure(&segments));
         assert_eq!(strokes.len(), 1);
         assert!((length(&points, &strokes) - 3.0 * (2.0 + 2.0 * 2f64.sqrt())).abs() < 1e-9);
     }
@@ -420,19 +429,22 @@ mod tests {
             }
         }
         let total: f64 = segments.iter().map(|(a, b)| DVec2::from(*a).distance(DVec2::from(*b))).sum();
-        let (points, strokes) = join(figure(&segments));
+        let (points, strokes) = join(ONE, figure(&segments));
         assert_eq!(strokes.len(), 4);
         assert!((length(&points, &strokes) - total).abs() < 1e-9);
     }
 
     #[test]
     fn an_open_end_goes_on_into_a_round() {
-        let (_, strokes) = join(figure(&[
-            ([-1., 0.], [0., 0.]),
-            ([0., 0.], [1., 1.]),
-            ([1., 1.], [1., -1.]),
-            ([1., -1.], [0., 0.]),
-        ]));
+        let (_, strokes) = join(
+            ONE,
+            figure(&[
+                ([-1., 0.], [0., 0.]),
+                ([0., 0.], [1., 1.]),
+                ([1., 1.], [1., -1.]),
+                ([1., -1.], [0., 0.]),
+            ]),
+        );
         assert_eq!(strokes.len(), 1);
     }
 
@@ -443,7 +455,7 @@ mod tests {
             let y = f64::from((k * 37) % 100);
             segments.push(([0., y], [5., y]));
         }
-        let (points, strokes) = join(figure(&segments));
+        let (points, strokes) = join(ONE, figure(&segments));
         let mut pen = DVec2::ZERO;
         let mut travel = 0.0;
         for s in &strokes {
