@@ -94,11 +94,8 @@ impl Bodies {
     pub fn sheets(&self, crew: Crew, topology: &Topology, paper: &Paper) -> Vec<bool> {
         let edges = &topology.edges;
         // A share keeps a number for each body: with many bodies that would be more than the edges.
-        let shares = if self.list.len() < edges.len() / 16 {
-            crew.shares(edges.len(), 1)
-        } else {
-            vec![0..edges.len()]
-        };
+        let threads = if self.list.len() < edges.len() / 16 { crew.threads } else { 1 };
+        let shares = Crew { threads }.shares(edges.len(), 1);
         let counts = crew.map(shares, |range| self.rounds(&edges[range], topology, paper));
         (0..self.list.len()).map(|b| counts.iter().fold(0u32, |n, c| n.saturating_add(c[b])) == 1).collect()
     }

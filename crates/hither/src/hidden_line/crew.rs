@@ -26,7 +26,7 @@ impl Crew {
 
     /// [`Crew::ranges`] of many things, or one range of few.
     pub fn shares(self, count: usize, each: usize) -> Vec<Range<usize>> {
-        if self.is_shared(count) { self.ranges(count, each) } else { vec![0..count] }
+        if self.is_shared(count) { self.ranges(count, each) } else { std::iter::once(0..count).collect() }
     }
 
     /// Whether so many things are worth being shared.

@@ -155,7 +155,7 @@ impl<'p> Shown<'p> {
         let Some(solid) = self.solids.last_mut() else { return };
         let bodies = &solid.topology.bodies;
         let turn = view_from_mesh.matrix3.determinant();
-        if solid.cut.is_some() || bodies.list.is_empty() || !(turn.abs() > 0.0) {
+        if solid.cut.is_some() || bodies.list.is_empty() || turn == 0.0 || turn.is_nan() {
             return;
         }
         solid.first_body = self.sheets.len() as u32;
