@@ -82,7 +82,9 @@ impl Cover {
         let solid = &shown.solids[shown.solid_of(seed)];
         let center = self.grid.center(cell % self.grid.columns, cell / self.grid.columns);
         let reach = self.reach(center);
-        if walks.next(0, center, reach).from(shown, solid, seed, hides).is_none() {
+        // What covers a cell covers it once if it is a sheet; nothing more need be known of it.
+        let sheet = shown.sheet(solid, seed);
+        if sheet.is_none() && walks.next(0, center, reach).from(shown, solid, seed, hides).is_none() {
             return false;
         }
         // Around a branch point a surface without folds can cover a cell twice.
@@ -92,8 +94,11 @@ impl Cover {
             if f64::from(occluder.nearest) < self.bound[cell] {
                 break;
             }
+            if sheet == Some(occluder.sheet) {
+                continue;
+            }
             let corners = shown.corners(occluder.triangle);
-            if walks.visited[occluder.triangle as usize] == walks.last {
+            if sheet.is_none() && walks.visited[occluder.triangle as usize] == walks.last {
                 over_center += usize::from(contains(&corners, center));
             } else if touches(&corners, center, reach) {
                 return false;
@@ -189,18 +194,16 @@ impl Samples {
     fn take(&mut self, shown: &Shown, grid: &Grid, bound: &[f64], triangle: u32) {
         let [a, b, c] = shown.corners(triangle);
         let (min, max) = rectangle([a, b, c]);
-        let last = grid.origin + DVec2::new(grid.columns as f64, grid.rows as f64) * grid.size;
-        if max.x < grid.origin.x || max.y < grid.origin.y || min.x > last.x || min.y > last.y {
+        let [columns, rows] = grid.centers(min, max);
+        if columns.is_empty() || rows.is_empty() {
             return;
         }
         let plane = Plane::through(a, b, c);
-        let cells = grid.cells(min, max);
-        for row in cells.rows.0..=cells.rows.1 {
+        for row in rows {
             let y = grid.center(0, row).y;
             let Some((from, to)) = span([a, b, c], y) else { continue };
-            let first = grid.column(from).max(cells.columns.0);
-            let end = grid.column(to).min(cells.columns.1);
-            for column in first..=end {
+            let first = grid.column(from).max(columns.start);
+            for column in first..columns.end.min(grid.column(to) + 1) {
                 let center = grid.center(column, row);
                 if center.x < from || center.x > to {
                     continue;
@@ -283,7 +286,10 @@ impl Walk<'_> {
             let corners = shown.corners(t);
             let lowest = corners[0].z.min(corners[1].z).min(corners[2].z);
             let [a, b, c] = corners;
-            farthest = farthest.min(lowest.max(Plane::through(a, b, c).least(self.center, self.reach)));
+            if lowest < farthest {
+                let least = Plane::through(a, b, c).least(self.center, self.reach);
+                farthest = farthest.min(lowest.max(least));
+            }
             for k in 0..3 {
                 if !enters(corners[k], corners[(k + 1) % 3], self.center, self.reach) {
                     continue;

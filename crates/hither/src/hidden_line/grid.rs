@@ -58,6 +58,18 @@ impl Grid {
         Cells { columns: (self.column(min.x), self.column(max.x)), rows: (self.row(min.y), self.row(max.y)) }
     }
 
+    /// The columns and rows whose centres are in a rectangle, but for rounding at its border; empty ranges
+    /// where there are none.
+    pub fn centers(&self, min: DVec2, max: DVec2) -> [Range<usize>; 2] {
+        // The number of centres before a coordinate; a cast of a float saturates.
+        let before = |x: f64, count: usize| ((x * self.per_pixel + 0.5) as usize).min(count);
+        let (min, max) = (min - self.origin, max - self.origin);
+        [
+            before(min.x, self.columns)..before(max.x, self.columns),
+            before(min.y, self.rows)..before(max.y, self.rows),
+        ]
+    }
+
     pub fn index(&self, column: usize, row: usize) -> usize {
         row * self.columns + column
     }
