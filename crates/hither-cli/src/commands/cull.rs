@@ -13,7 +13,7 @@ use crate::source;
 use crate::timeline::Timeline;
 use clap::ValueEnum;
 use hither::conventions::View;
-use hither::cull::{CullCounters, CullOptions, Culler, Reason};
+use hither::cull::{CullCounters, CullOptions, Culler, Meaning, Reason};
 use hither::{IndexOptions, RenderOptions, Renderer, SceneIndex};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -30,6 +30,12 @@ pub struct Arguments {
     /// How far the eye may move while the answer stays true, in metres (methods buffer and planes)
     #[arg(long, value_name = "METRES", value_parser = metres, default_value = "0", allow_hyphen_values = true)]
     margin: f64,
+    /// How far each object may move while the answer stays true, in metres (method buffer)
+    #[arg(long, value_name = "METRES", value_parser = metres, default_value = "0", allow_hyphen_values = true)]
+    objects_move: f64,
+    /// Leave out what shows at no pixel's centre, too: for drawing at this very size (method buffer)
+    #[arg(long)]
+    sampled: bool,
     /// Start each frame with what hid something in the last (method buffer)
     #[arg(long)]
     coherence: bool,
@@ -109,6 +115,14 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
     if !buffer && (arguments.reasons || arguments.coherence) {
         return Err(Failure::usage("--reasons and --coherence go with --method buffer"));
     }
+    if !buffer && (arguments.sampled || arguments.objects_move > 0.0) {
+        return Err(Failure::usage("--sampled and --objects-move go with --method buffer"));
+    }
+    if arguments.sampled && (arguments.margin > 0.0 || arguments.objects_move > 0.0) {
+        return Err(Failure::usage(
+            "--sampled holds for one eye alone: it goes without --margin and --objects-move",
+        ));
+    }
     if arguments.method == MethodName::Exact && arguments.margin > 0.0 {
         return Err(Failure::usage("--margin goes with --method buffer or planes"));
     }
@@ -132,6 +146,8 @@ impl Method {
                 culler.prepare(index);
                 let options = CullOptions {
                     eye_moves: arguments.margin,
+                    objects_move: arguments.objects_move,
+                    meaning: if arguments.sampled { Meaning::Sampled } else { Meaning::Continuous },
                     coherence: arguments.coherence,
                     reasons: arguments.reasons,
                     ..CullOptions::default()
@@ -223,6 +239,8 @@ fn settings(arguments: &Arguments, eye: &Eye, index: &SceneIndex) -> Map<String,
     map.insert("camera".into(), camera.into());
     map.insert("method".into(), options::word(arguments.method).into());
     map.insert("margin".into(), arguments.margin.into());
+    map.insert("objects_move".into(), arguments.objects_move.into());
+    map.insert("sampled".into(), arguments.sampled.into());
     map
 }
 
@@ -232,6 +250,7 @@ fn counters(c: &CullCounters) -> Value {
         "boxes_asked": c.boxes_asked,
         "boxes_hidden": c.boxes_hidden,
         "occluders": c.occluders,
+        "occluders_idle": c.occluders_idle,
         "occluder_patches": c.occluder_patches,
         "occluder_faces": c.occluder_faces,
         "second_thoughts": c.second_thoughts,

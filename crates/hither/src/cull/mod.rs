@@ -18,6 +18,17 @@ pub use buffer::{
 };
 pub use scene::{CullCounters, CullOptions, Culler, Culling, Judged, Reason, cull};
 
+/// Where something must show to count as seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Meaning {
+    /// Anywhere in the continuous image: true at every resolution.
+    #[default]
+    Continuous,
+    /// At a pixel's centre, as a rasteriser that draws at this resolution samples it: what falls between the
+    /// centres is left out too.
+    Sampled,
+}
+
 /// What is known about something that was asked about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Verdict {

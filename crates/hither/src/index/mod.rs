@@ -17,7 +17,7 @@ mod tree;
 pub(crate) use boxes::tree_of_boxes;
 pub(crate) use group::GroupIndex;
 pub(crate) use mesh::{BlockTree, MeshIndex};
-pub(crate) use tree::{Box3, Child, Slot, WideTree};
+pub(crate) use tree::{Box3, Child, Slot, WideNode, WideTree};
 
 use crate::scene::{Content, Scene, Transform};
 use rayon::prelude::*;

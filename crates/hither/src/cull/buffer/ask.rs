@@ -23,6 +23,8 @@ pub(crate) struct BoxView {
     height: f32,
     /// Whether f32 can hold the numbers; else every box is seen everywhere.
     in_range: bool,
+    /// Whether only pixels whose centres a box holds count as touched, up to what snapping moves.
+    pub centres: bool,
     /// How far the eye may move, metres, and pixels that a metre covers at distance 1: what lies beyond the
     /// image's border by no more than their product over its distance may come into view.
     pub margin: [f32; 2],
@@ -60,10 +62,14 @@ impl BoxView {
             perspective: at.perspective,
             width: width as f32,
             height: height as f32,
+            centres: false,
             margin: [0.0; 2],
         }
     }
 }
+
+/// Pixels that snapping moves a corner by, at most, and as much again.
+const SNAP: f32 = 1.0 / 256.0;
 
 /// Eight times half a unit in the last place, and a little for the rounding of the bound itself.
 const ROUNDING: f32 = 8.1 / (1 << 24) as f32;
@@ -128,8 +134,14 @@ pub(crate) fn project<S: Simd>(
         inside &= !(unseen & clear);
         let far = f32x16::splat(simd, 1e30);
         certain &= from.abs().simd_lt(far) & to.abs().simd_lt(far);
-        rect[k] = from.floor().max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, size - 1.0));
-        rect[k + 2] = to.floor().min(f32x16::splat(simd, size - 1.0)).max(f32x16::splat(simd, 0.0));
+        let (mut first, mut last) = (from.floor(), to.floor());
+        if view.centres {
+            first = (from - (0.5 + SNAP)).ceil().max(f32x16::splat(simd, 0.0));
+            last = (to - (0.5 - SNAP)).floor().min(f32x16::splat(simd, size - 1.0));
+            inside &= !(first.simd_gt(last) & clear);
+        }
+        rect[k] = first.max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, size - 1.0));
+        rect[k + 2] = last.min(f32x16::splat(simd, size - 1.0)).max(f32x16::splat(simd, 0.0));
     }
     let mut inside_bits = inside.to_bitmask() as u16;
     let clear_bits = clear.to_bitmask() as u16;

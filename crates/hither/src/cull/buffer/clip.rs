@@ -59,13 +59,36 @@ pub(super) fn clip(v: [[f64; 4]; 3], placing: &Placing) -> Option<Clipped> {
     let nothing = (Corner { x: 0, y: 0, depth: 0.0 }, EdgeOf::Cut);
     let mut clipped = Clipped { corner: [nothing; 8], len: polygon.len, sign: 0 };
     for (to, (p, edge)) in clipped.corner.iter_mut().zip(&polygon.corner[..polygon.len]) {
-        // Cut points may miss the band by a rounding; snapping must not.
-        let snap = |c: f64| (c / p[2]).clamp(low, high).round_ties_even() as i32;
-        let depth = placing.depth(p[3] / p[2]);
-        *to = (Corner { x: snap(p[0]), y: snap(p[1]), depth }, *edge);
+        *to = (snapped(p, placing), *edge);
     }
     clipped.sign = sign_of_fan(&clipped);
     Some(clipped)
+}
+
+/// Where a point is on the screen.
+pub(super) fn snapped(p: &[f64; 4], placing: &Placing) -> Corner {
+    // Cut points may miss the band by a rounding; snapping must not.
+    let (low, high) = (GUARD_MIN * 256.0, GUARD_MAX * 256.0);
+    let snap = |c: f64| (c / p[2]).clamp(low, high).round_ties_even() as i32;
+    Corner { x: snap(p[0]), y: snap(p[1]), depth: placing.depth(p[3] / p[2]) }
+}
+
+/// Bit by bit the planes that a point is beyond, as [`clip`] sees it. Several points that are all beyond one plane
+/// have nothing inside. A point that is no number is beyond all.
+pub(super) fn beyond(p: &[f64; 4]) -> u8 {
+    let (low, high) = (GUARD_MIN * 256.0, GUARD_MAX * 256.0);
+    let inside = [
+        p[2] - p[3] >= 0.0,
+        p[0] - low * p[2] >= 0.0,
+        high * p[2] - p[0] >= 0.0,
+        p[1] - low * p[2] >= 0.0,
+        high * p[2] - p[1] >= 0.0,
+    ];
+    let mut beyond = 0;
+    for (bit, inside) in inside.into_iter().enumerate() {
+        beyond |= u8::from(!inside) << bit;
+    }
+    if p.iter().all(|c| c.is_finite()) { beyond } else { 0x1F }
 }
 
 fn sign_of_fan(clipped: &Clipped) -> i32 {

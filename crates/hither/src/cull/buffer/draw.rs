@@ -2,8 +2,10 @@
 
 use super::Drawn;
 use super::ask::{BoxView, project};
-use super::clip::{Clipped, EdgeOf, clip, doubled_area};
+use super::clip::{self, Clipped, EdgeOf, clip, doubled_area};
 use super::fill::{Joint, Outline, fill};
+use super::loose::{LooseFaces, Sixteen, fill_one, set_up};
+use super::mosaic::{Drawing, Mosaic};
 use super::occluder::{ENDS, Face, Occluder, Patch};
 use super::place::{Placed, Placing, Sizes};
 use super::surface::Surface;
@@ -22,6 +24,11 @@ pub(in crate::cull) struct Band {
     /// For each face of a patch +1 or −1, its turn on the screen, or 0 if it is not drawn.
     turns: Vec<i8>,
     clipped: Vec<(u32, [Option<Clipped>; 2])>,
+    /// Of a patch that is clipped the vertices, homogeneous, and the planes that each is beyond.
+    points: Vec<[f64; 4]>,
+    beyond: Vec<u8>,
+    loose: Box<Sixteen>,
+    mosaic: Mosaic,
     open: BinaryHeap<Open>,
 }
 
@@ -60,6 +67,8 @@ impl Eq for Open {}
 pub(in crate::cull) struct Standing<'a> {
     pub occluder: &'a Occluder,
     pub at: ScreenFromObject,
+    /// The eye in its space: a point, or a direction.
+    pub eye: [f32; 4],
     pub boxes: BoxView,
     pub(super) sizes: Sizes,
     /// How far the eye may move relative to it, metres, and pixels a metre at distance 1 across the image.
@@ -68,6 +77,8 @@ pub(in crate::cull) struct Standing<'a> {
     pub least_px: i32,
     /// Patches whose boxes cover fewer pixels than this for each face are not worth drawing.
     pub px_a_face: i32,
+    /// Draw all patches alike, face by face, as if none were loose or fine: slower, to compare with.
+    pub plain: bool,
 }
 
 impl Band {
@@ -80,6 +91,10 @@ impl Band {
             placed: Placed::default(),
             turns: vec![],
             clipped: vec![],
+            points: vec![],
+            beyond: vec![],
+            loose: Box::default(),
+            mosaic: Mosaic::default(),
             open: BinaryHeap::new(),
         }
     }
@@ -92,6 +107,17 @@ impl Band {
     /// Makes it empty.
     pub fn clear(&mut self) {
         self.surface.clear();
+    }
+
+    /// Says who draws from now on.
+    pub fn drawing(&mut self, who: u32) {
+        self.surface.drawing = who;
+    }
+
+    /// Who, more or less, hides a rectangle of the surface that is hidden.
+    #[inline(always)]
+    pub fn who_hides(&self, rect: [i32; 4]) -> u32 {
+        self.surface.raised_by(rect)
     }
 
     /// The part of an image's rectangle (inclusive) in this band, in its own rows.
@@ -123,7 +149,7 @@ impl Band {
             return;
         }
         self.open.clear();
-        self.visit(simd, standing, 0);
+        self.visit(simd, standing, 0, drawn);
         while let Some(open) = self.open.pop() {
             let hidden = match self.rows_of(open.rect) {
                 Some(rect) => simd.vectorize(
@@ -137,7 +163,7 @@ impl Band {
                 continue;
             }
             match open.slot.child() {
-                Child::Node(node) => self.visit(simd, standing, node),
+                Child::Node(node) => self.visit(simd, standing, node, drawn),
                 Child::Leaf(patch) => {
                     let patch = &standing.occluder.patches[patch as usize];
                     let [left, top, right, bottom] = open.rect.map(i64::from);
@@ -158,15 +184,31 @@ impl Band {
         );
     }
 
-    /// Opens the children of a node that the image may show.
+    /// Draws the loose faces of a node, and opens its other children that the image may show.
     #[inline(always)]
-    fn visit<S: Simd>(&mut self, simd: S, standing: &Standing, node: u32) {
-        let node = &standing.occluder.tree.nodes[node as usize];
+    fn visit<S: Simd>(&mut self, simd: S, standing: &Standing, number: u32, drawn: &mut Drawn) {
+        let node = &standing.occluder.tree.nodes[number as usize];
+        let mut lanes = 0xFFFF >> (16 - node.used);
+        // With a margin all goes jointly, patch by patch.
+        let plain = standing.plain || standing.margin.is_some();
+        if let (Some(loose), false) = (standing.occluder.loose_of_node[number as usize], plain) {
+            let loose = &standing.occluder.loose[loose as usize];
+            lanes &= !u32::from(loose.lanes);
+            let reach_near = simd.vectorize(
+                #[inline(always)]
+                || self.draw_loose(simd, standing, loose, drawn),
+            );
+            // Those that reach the near plane are patches like others.
+            lanes |= u32::from(reach_near);
+        }
+        if lanes == 0 {
+            return;
+        }
         let boxes = simd.vectorize(
             #[inline(always)]
             || project(simd, &standing.boxes, &node.min, &node.max),
         );
-        let mut rest = u32::from(boxes.inside) & (0xFFFF >> (16 - node.used));
+        let mut rest = u32::from(boxes.inside) & lanes;
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize;
             rest &= rest - 1;
@@ -181,13 +223,35 @@ impl Band {
         }
     }
 
+    /// Draws faces that are patches by themselves. Returns the lanes of those that must be clipped first.
+    #[inline(always)]
+    fn draw_loose<S: Simd>(
+        &mut self,
+        simd: S,
+        standing: &Standing,
+        faces: &LooseFaces,
+        drawn: &mut Drawn,
+    ) -> u16 {
+        let sixteen = &mut self.loose;
+        let sorted = set_up(simd, faces, &standing.at, &standing.sizes, standing.least_px, sixteen);
+        let mut rest = sorted.draw;
+        drawn.patches += u64::from(rest.count_ones());
+        drawn.faces += u64::from(rest.count_ones());
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize & 15;
+            rest &= rest - 1;
+            fill_one(simd, &mut self.surface, sixteen, lane);
+        }
+        sorted.clip
+    }
+
     #[inline(always)]
     fn draw_patch<S: Simd>(
         &mut self,
         simd: S,
         standing: &Standing,
         patch: &Patch,
-        Open { clear, depth, .. }: Open,
+        Open { clear, depth, rect, .. }: Open,
         drawn: &mut Drawn,
     ) {
         let near = standing.at.d[3];
@@ -198,6 +262,25 @@ impl Band {
             false => 1.0,
         };
         let Some(placing) = Placing::new(&standing.at, &standing.sizes, least_w) else { return };
+        let plain = standing.plain || standing.margin.is_some() || !clear;
+        if let (false, Some(fine)) = (plain, &patch.fine)
+            && is_fine(rect, patch.faces)
+            && let Some(rect) = self.rows_of(rect)
+        {
+            let fine = standing.occluder.fine.get(fine, patch.faces);
+            placing.place(simd, &standing.occluder.vertices, patch, &mut self.placed);
+            let drawing = Drawing {
+                patch: fine,
+                placed: &self.placed,
+                eye: standing.eye,
+                front_sign: standing.at.front_sign as i32,
+                slack: placing.slack,
+                rect,
+            };
+            drawn.patches += 1;
+            drawn.faces += self.mosaic.draw(simd, &mut self.surface, &drawing);
+            return;
+        }
         let faces = &standing.occluder.faces[patch.first_face as usize..][..patch.faces as usize];
         self.clipped.clear();
         if clear {
@@ -207,36 +290,44 @@ impl Band {
         }
         let Some(margin_px) = self.margin_px(standing) else { return };
         drawn.patches += 1;
-        for (f, face) in faces.iter().enumerate() {
-            if self.turns[f] == 0 {
-                continue;
-            }
-            drawn.faces += 1;
-            let ends = ends_of(face, f, &self.turns);
-            if let Ok(at) = self.clipped.binary_search_by_key(&(f as u32), |c| c.0) {
-                let pieces = self.clipped[at].1;
-                for (p, piece) in pieces.iter().enumerate() {
-                    let Some(piece) = piece else { continue };
-                    let ends =
-                        if face.corners == 3 { ends } else { ends_of_half(ends, p, pieces[1 - p].is_none()) };
-                    fan(piece, i32::from(self.turns[f]), ends, |outline| {
-                        fill(simd, &mut self.surface, &mut self.joint, outline, placing.slack, margin_px > 0);
-                    });
-                }
-                continue;
-            }
-            let outline = Outline {
-                corner: self.placed.corners(&face.corner),
-                corners: usize::from(face.corners),
-                turn: i32::from(self.turns[f]),
-                ends,
-            };
-            fill(simd, &mut self.surface, &mut self.joint, &outline, placing.slack, margin_px > 0);
-        }
+        drawn.faces += self.turns.iter().filter(|turn| **turn != 0).count() as u64;
+        self.fill_faces(simd, faces, placing.slack, margin_px > 0);
         if margin_px > 0 {
             self.joint.finish_eroded(simd, &mut self.surface, self.placed.nearest, margin_px);
         } else {
             self.joint.finish(simd, &mut self.surface, self.placed.nearest);
+        }
+    }
+
+    /// Fills the faces of a patch, whose turns are known and whose corners are placed or clipped.
+    #[inline(always)]
+    fn fill_faces<S: Simd>(&mut self, simd: S, faces: &[Face], slack: i32, jointly: bool) {
+        let (surface, joint) = (&mut self.surface, &mut self.joint);
+        // Those that were clipped come in the order of the faces.
+        let mut next = 0;
+        for (f, face) in faces.iter().enumerate() {
+            let turn = i32::from(self.turns[f]);
+            if turn == 0 {
+                continue;
+            }
+            let ends = ends_of(face, f, &self.turns);
+            let corner = self.placed.corners(&face.corner);
+            if !self.clipped.get(next).is_some_and(|c| c.0 == f as u32) {
+                let outline = Outline { corner, corners: usize::from(face.corners), turn, ends };
+                fill(simd, surface, joint, &outline, slack, jointly);
+                continue;
+            }
+            let pieces = self.clipped[next].1;
+            next += 1;
+            for (p, piece) in pieces.iter().enumerate() {
+                let Some(piece) = piece else { continue };
+                let ends =
+                    if face.corners == 3 { ends } else { ends_of_half(ends, p, pieces[1 - p].is_none()) };
+                for i in 1..piece.len - 1 {
+                    let outline = of_fan(piece, i, turn, ends);
+                    fill(simd, surface, joint, &outline, slack, jointly);
+                }
+            }
         }
     }
 
@@ -272,46 +363,50 @@ impl Band {
         let front = standing.at.front_sign as i32;
         self.turns.clear();
         for face in faces {
-            let c = self.placed.corners(&face.corner);
-            let sign = if face.corners == 3 {
-                Some(doubled_area(&c[0], &c[1], &c[2]).signum() as i32)
-            } else {
-                let t = [
-                    doubled_area(&c[0], &c[1], &c[2]),
-                    doubled_area(&c[1], &c[2], &c[3]),
-                    doubled_area(&c[2], &c[3], &c[0]),
-                    doubled_area(&c[3], &c[0], &c[1]),
-                ];
-                let (low, high) = (t[0].min(t[1]).min(t[2].min(t[3])), t[0].max(t[1]).max(t[2].max(t[3])));
-                // Turns that differ: seen so nearly edge-on that it is no convex outline.
-                (low >= 0 || high <= 0).then_some(high.signum() as i32 + low.signum() as i32)
-            };
-            let turn = match sign {
-                Some(s) => turn_of(s.signum(), front, face.two_sided),
-                None => 0,
-            };
-            self.turns.push(turn);
+            self.turns.push(placed_turn(&self.placed, face, front));
+        }
+    }
+
+    /// Places each vertex of a patch that needs clipping, as [`clip`] would, and notes what it is beyond.
+    fn place_apart(&mut self, standing: &Standing, patch: &Patch, placing: &Placing) {
+        let vertices = &standing.occluder.vertices;
+        let (first, count) = (patch.first_vertex as usize, patch.vertices as usize);
+        self.points.clear();
+        self.beyond.clear();
+        self.placed.corner.clear();
+        for i in first..first + count {
+            let p = placing.at.point([vertices.x[i], vertices.y[i], vertices.z[i]].map(f64::from));
+            let beyond = clip::beyond(&p);
+            self.placed.corner.push(if beyond == 0 { clip::snapped(&p, placing).bits() } else { [0; 4] });
+            self.points.push(p);
+            self.beyond.push(beyond);
         }
     }
 
     /// Clips a patch's faces one by one and says which way what is left of them turns.
     #[inline(never)]
     fn clipped_turns(&mut self, standing: &Standing, patch: &Patch, placing: &Placing, faces: &[Face]) {
-        let vertices = &standing.occluder.vertices;
-        let point = |v: u32| {
-            let i = (patch.first_vertex + v) as usize;
-            let p = [vertices.x[i], vertices.y[i], vertices.z[i]].map(f64::from);
-            placing.at.point(p)
-        };
+        self.place_apart(standing, patch, placing);
         let front = standing.at.front_sign as i32;
         self.turns.clear();
         self.placed.nearest = 0.0;
         for (f, face) in faces.iter().enumerate() {
-            let c = face.corner.map(point);
-            if !c.as_flattened().iter().all(|c| c.is_finite()) {
+            let [a, b, c, d] = face.corner.map(|v| self.beyond[v as usize]);
+            if a & b & c & d != 0 {
+                // Nothing of it lies inside.
                 self.turns.push(0);
                 continue;
             }
+            if a | b | c | d == 0 {
+                let turn = placed_turn(&self.placed, face, front);
+                self.turns.push(turn);
+                if turn != 0 {
+                    let depths = self.placed.corners(&face.corner).map(|c| c.depth);
+                    self.placed.nearest = depths.into_iter().fold(self.placed.nearest, f32::max);
+                }
+                continue;
+            }
+            let c = face.corner.map(|v| self.points[v as usize]);
             let two = face.corners == 4;
             let pieces =
                 [clip([c[0], c[1], c[2]], placing), two.then(|| clip([c[0], c[2], c[3]], placing)).flatten()];
@@ -330,6 +425,37 @@ impl Band {
             }
         }
     }
+}
+
+/// Whether faces are so small that each one's farthest corner is bound enough for its depth.
+fn is_fine([left, top, right, bottom]: [i32; 4], faces: u32) -> bool {
+    (right - left + 1) * (bottom - top + 1) <= PX_A_FINE_FACE * faces as i32
+}
+
+/// Pixels in the rectangle around a patch for each of its faces.
+const PX_A_FINE_FACE: i32 = 16;
+
+/// The turn of a face whose corners are placed, or 0 if it is not drawn.
+#[inline(always)]
+fn placed_turn(placed: &Placed, face: &Face, front: i32) -> i8 {
+    let c = placed.corners(&face.corner);
+    let sign = if face.corners == 3 {
+        doubled_area(&c[0], &c[1], &c[2]).signum() as i32
+    } else {
+        let t = [
+            doubled_area(&c[0], &c[1], &c[2]),
+            doubled_area(&c[1], &c[2], &c[3]),
+            doubled_area(&c[2], &c[3], &c[0]),
+            doubled_area(&c[3], &c[0], &c[1]),
+        ];
+        let (low, high) = (t[0].min(t[1]).min(t[2].min(t[3])), t[0].max(t[1]).max(t[2].max(t[3])));
+        // Turns that differ: seen so nearly edge-on that it is no convex outline.
+        if low < 0 && high > 0 {
+            return 0;
+        }
+        high.signum() as i32 + low.signum() as i32
+    };
+    turn_of(sign.signum(), front, face.two_sided)
 }
 
 /// +1 or −1 for a face that is drawn, else 0. `sign` is that of its area on the screen.
@@ -362,22 +488,26 @@ fn ends_of_half(ends: u32, half: usize, alone: bool) -> u32 {
     if half == 0 { (ends & 3) | u32::from(alone) << 2 } else { (ends >> 1 & 6) | u32::from(alone) }
 }
 
-/// The triangles of a clipped piece's fan, whose diagonals are shared. `ends` are those of the triangle.
-fn fan(piece: &Clipped, turn: i32, ends: u32, mut each: impl FnMut(&Outline)) {
-    let n = piece.len;
-    let ends_at = |i: usize| match piece.corner[i].1 {
+/// Triangle `i`, from 1, of a clipped piece's fan, whose diagonals are shared. `ends` are those of the triangle that
+/// was clipped.
+#[inline(always)]
+fn of_fan(piece: &Clipped, i: usize, turn: i32, ends: u32) -> Outline {
+    let corner = [piece.corner[0].0, piece.corner[i].0, piece.corner[i + 1].0, piece.corner[0].0];
+    let mut bits = end_after(piece, i, ends) << 1;
+    if i == 1 {
+        bits |= end_after(piece, 0, ends);
+    }
+    if i == piece.len - 2 {
+        bits |= end_after(piece, piece.len - 1, ends) << 2;
+    }
+    Outline { corner, corners: 3, turn, ends: bits }
+}
+
+/// 1 if the surface ends at the edge that follows corner `i`.
+#[inline(always)]
+fn end_after(piece: &Clipped, i: usize, ends: u32) -> u32 {
+    match piece.corner[i].1 {
         EdgeOf::Cut => 1,
         EdgeOf::Triangle(k) => ends >> k & 1,
-    };
-    for i in 1..n - 1 {
-        let corner = [piece.corner[0].0, piece.corner[i].0, piece.corner[i + 1].0, piece.corner[0].0];
-        let mut bits = ends_at(i) << 1;
-        if i == 1 {
-            bits |= ends_at(0);
-        }
-        if i == n - 2 {
-            bits |= ends_at(n - 1) << 2;
-        }
-        each(&Outline { corner, corners: 3, turn, ends: bits });
     }
 }

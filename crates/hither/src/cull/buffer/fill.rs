@@ -14,6 +14,7 @@
 //! `e = ⌊(E + bias) / 256⌋ = A·px + B·py + C` is a whole number with whole steps, and `e ≥ 0` is the fill
 //! rule exactly. A pixel's square, widened by the slack, reaches `h = (|A| + |B|)·(128 + slack)` from there.
 
+use super::loose::tile_plane;
 use super::surface::{Row, Surface, TilePlane};
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
@@ -23,6 +24,13 @@ pub(super) struct Corner {
     pub x: i32,
     pub y: i32,
     pub depth: f32,
+}
+
+impl Corner {
+    /// As a patch's vertices are kept.
+    pub fn bits(&self) -> [i32; 4] {
+        [self.x, self.y, self.depth.to_bits().cast_signed(), 0]
+    }
 }
 
 /// A convex polygon of three or four corners.
@@ -120,6 +128,7 @@ impl Joint {
 
     /// As [`Joint::finish`], but a pixel gets the least depth of all within `radius` pixels, and nothing
     /// where one of these is not covered or not in the image.
+    #[inline(always)]
     pub fn finish_eroded<S: Simd>(&mut self, simd: S, surface: &mut Surface, nearest: f32, radius: i32) {
         let (mut left, mut top, mut right, mut bottom) = (i32::MAX, i32::MAX, 0, 0);
         for &tile in &self.dirty {
@@ -275,13 +284,7 @@ impl<'a> Face<'a> {
     /// The plane over a tile, lowered by more than the roundings of its use.
     #[inline(always)]
     fn tile_plane(&self, x: i32, y: i32) -> TilePlane {
-        let [a, b, c] = self.plane;
-        let (x, y) = (f64::from(x), f64::from(y + self.band));
-        let origin = c + a * x + b * y;
-        let size = origin.abs() + 16.0 * (a.abs() + b.abs());
-        let size = size + (c.abs() + a.abs() * x.abs() + b.abs() * y.abs()) * 1e-12;
-        let origin = (origin - size * (1.0 / f64::from(1 << 20))) as f32;
-        TilePlane { origin, per_column: a as f32, per_row: b as f32 }
+        tile_plane(self.plane, x, y + self.band)
     }
 
     #[inline(always)]
@@ -347,13 +350,13 @@ fn from_first(c: &[Corner; 4], k: usize) -> (f64, f64, f64) {
 
 /// First pixel whose square, widened by the slack, reaches a coordinate.
 #[inline(always)]
-fn first_pixel(v: i32, slack: i32) -> i32 {
+pub(super) fn first_pixel(v: i32, slack: i32) -> i32 {
     (v - slack - 1) >> 8
 }
 
 /// Last one.
 #[inline(always)]
-fn last_pixel(v: i32, slack: i32) -> i32 {
+pub(super) fn last_pixel(v: i32, slack: i32) -> i32 {
     (v + slack) >> 8
 }
 

@@ -44,6 +44,19 @@
 //! *Cutting* at the near plane and at the guard band replaces the chain by another with the same cut points for
 //! both owners of an edge; what the near plane cuts ends there.
 //!
+//! # Three ways to draw a patch
+//!
+//! All rest on the same inequality; they differ in what they need not look at. A patch of one face ends at every
+//! edge, so a pixel is covered where it lies inside all of them ([`loose`]). In a patch of many small faces N(c) is
+//! counted from the outline alone, and each face bounds depth by its farthest corner ([`mosaic`]). Else each face
+//! is filled, and only pixels that shared edges cross are counted ([`fill`]).
+//!
+//! # Sampled
+//!
+//! Asked with [`Meaning::Sampled`], the extent of a box are only the pixels whose centres it may hold, moved by no
+//! more than 1/256 pixel as a rasteriser snaps corners. What a pixel holds is true of its whole square, hence of
+//! its centre; and there, by the fill rule on snapped corners, at least one face of the patch is drawn.
+//!
 //! # A moving eye
 //!
 //! With a margin of r metres a patch is eroded by ρ pixels, and each pixel takes the least depth within ρ, where
@@ -58,6 +71,9 @@ mod ask;
 mod clip;
 mod draw;
 mod fill;
+mod fine;
+mod loose;
+mod mosaic;
 mod occluder;
 mod place;
 mod queries;
@@ -65,17 +81,16 @@ mod sampled;
 mod shared;
 mod surface;
 
-pub(super) use ask::project;
+pub(super) use ask::{BoxView, project};
 pub(super) use draw::Band;
 pub use occluder::{Occluder, OccluderError, Sides};
 pub use queries::{Boxes, ScreenRect};
 pub use sampled::SampledBuffer;
 pub use shared::SharedBuffer;
 
-use super::Verdict;
+use super::{Meaning, Verdict};
 use crate::conventions::{Projection, View, ViewError};
 use crate::raster::ScreenFromObject;
-use ask::BoxView;
 use draw::Standing;
 use fearless_simd::{Level, dispatch};
 use glam::DAffine3;
@@ -137,6 +152,8 @@ pub struct OcclusionBuffer {
 pub(super) struct Frame {
     pub view: View,
     pub options: OcclusionOptions,
+    /// What boxes are asked about.
+    pub meaning: Meaning,
     pub screen_from_world: ScreenFromObject,
 }
 
@@ -147,7 +164,16 @@ impl Frame {
         if !moves.iter().all(|m| m.is_finite() && *m >= 0.0) {
             return Err(ViewError::Camera("what moves must move by a finite distance that is not negative"));
         }
-        Ok(Frame { view: *view, options: *options, screen_from_world: ScreenFromObject::of_view(view) })
+        let screen_from_world = ScreenFromObject::of_view(view);
+        Ok(Frame { view: *view, options: *options, meaning: Meaning::Continuous, screen_from_world })
+    }
+
+    /// The same, asked with another meaning. Samples stay where they are only as long as nothing moves.
+    pub(super) fn meaning(self, meaning: Meaning) -> Result<Frame, ViewError> {
+        if meaning == Meaning::Sampled && self.margin().is_some() {
+            return Err(ViewError::Camera("what is sampled holds for this eye alone: it has no margin"));
+        }
+        Ok(Frame { meaning, ..self })
     }
 
     /// Pixels a metre at distance 1 covers anywhere in the image.
@@ -174,10 +200,21 @@ impl Frame {
 
     pub(super) fn standing_at<'a>(&self, occluder: &'a Occluder, at: ScreenFromObject) -> Standing<'a> {
         let boxes = BoxView::new(&at, self.view.width, self.view.height);
-        let sizes = Sizes::new(&at, occluder.tree.bounds().reach());
+        let sizes = Sizes::new(&at, occluder.reach);
         // What touches two columns covers none of them; unless there are but two.
         let least_px = 2.min(self.view.width.min(self.view.height) as i32 - 1);
-        Standing { occluder, at, boxes, sizes, margin: self.margin(), least_px, px_a_face: 0 }
+        let eye = mosaic::eye_in_object(&at);
+        Standing {
+            occluder,
+            at,
+            eye,
+            boxes,
+            sizes,
+            margin: self.margin(),
+            least_px,
+            px_a_face: 0,
+            plain: false,
+        }
     }
 }
 

@@ -11,6 +11,8 @@
 //! Any triangles will do: open, closed, non-manifold, degenerate. What is paired decides only how *tight* the
 //! coverage is; that it is never too large is proved in [`super`] for every pairing.
 
+use super::fine::{Fine, FineFaces};
+use super::loose::LooseFaces;
 use crate::index::{Box3, WideTree, tree_of_boxes};
 use crate::scene::{AlphaMode, Material, Mesh};
 use glam::{DVec3, Vec3};
@@ -47,6 +49,12 @@ pub struct Occluder {
     pub(super) faces: Vec<Face>,
     pub(super) patches: Vec<Patch>,
     pub(super) tree: WideTree,
+    /// Largest magnitudes of its coordinates.
+    pub(super) reach: [f64; 3],
+    /// For each node of the tree the place in `loose` of its faces that are patches by themselves.
+    pub(super) loose_of_node: Vec<Option<u32>>,
+    pub(super) loose: Vec<LooseFaces>,
+    pub(super) fine: FineFaces,
     triangles: usize,
 }
 
@@ -66,6 +74,8 @@ pub(super) struct Patch {
     pub vertices: u32,
     pub first_face: u32,
     pub faces: u32,
+    /// Where it lies among the fine patches, if it has many faces.
+    pub fine: Option<Fine>,
     pub bounds: Box3,
 }
 
@@ -148,6 +158,9 @@ impl Occluder {
             + size_of_val(self.faces.as_slice())
             + size_of_val(self.patches.as_slice())
             + size_of_val(self.tree.nodes.as_slice())
+            + size_of_val(self.loose_of_node.as_slice())
+            + size_of_val(self.loose.as_slice())
+            + self.fine.memory_bytes()
     }
 }
 
@@ -331,11 +344,19 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
             vertices: occluder.vertices.x.len() as u32 - first_vertex,
             first_face,
             faces: occluder.faces.len() as u32 - first_face,
+            fine: occluder.fine.push(
+                &occluder.faces[first_face as usize..],
+                &occluder.vertices,
+                first_vertex,
+            ),
             bounds,
         });
         boxes.push(bounds);
     }
     occluder.tree = tree_of_boxes(&boxes);
+    occluder.reach = occluder.tree.bounds().reach();
+    (occluder.loose, occluder.loose_of_node) =
+        LooseFaces::of_tree(&occluder.tree, &occluder.patches, &occluder.faces, &occluder.vertices);
     occluder
 }
 

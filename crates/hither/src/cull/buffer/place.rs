@@ -3,7 +3,7 @@
 use super::fill::Corner;
 use super::occluder::{Patch, Vertices};
 use crate::raster::ScreenFromObject;
-use fearless_simd::{Simd, f32x16, f64x8, prelude::*};
+use fearless_simd::{Simd, f32x16, f64x8, i32x4, i32x16, prelude::*};
 
 /// Coordinates beyond this many pixels from the image's corner are clipped away: edges then fit 64 bits, and
 /// their steps within a tile 32.
@@ -13,11 +13,9 @@ pub(super) const GUARD_MAX: f64 = 24576.0;
 /// A patch's vertices on the screen.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Placed {
-    /// 1/256 pixel.
-    pub x: Vec<i32>,
-    pub y: Vec<i32>,
-    /// No larger than the depth of the vertex.
-    pub depth: Vec<f32>,
+    /// x and y in 1/256 pixel, the bits of a depth that is no larger than the vertex's, and nothing: four
+    /// together are one load. Depths of 0 and more are ordered as their bits are.
+    pub corner: Vec<[i32; 4]>,
     /// The largest of the depths.
     pub nearest: f32,
 }
@@ -25,8 +23,8 @@ pub(super) struct Placed {
 impl Placed {
     #[inline(always)]
     fn corner(&self, vertex: u32) -> Corner {
-        let vertex = vertex as usize;
-        Corner { x: self.x[vertex], y: self.y[vertex], depth: self.depth[vertex] }
+        let [x, y, depth, _] = self.corner[vertex as usize];
+        Corner { x, y, depth: f32::from_bits(depth.cast_unsigned()) }
     }
 
     #[inline(always)]
@@ -93,13 +91,21 @@ impl Placing {
             as f32
     }
 
+    /// As [`Placing::depth`], of depths that are divided by W already, but still in f64.
+    #[inline(always)]
+    pub fn depths<S: Simd>(&self, simd: S, d: f64x8<S>) -> f64x8<S> {
+        if self.at.perspective {
+            d * f64x8::splat(simd, self.shrink)
+        } else {
+            d - (d.abs() * (1.0 - self.shrink) + 2e-6)
+        }
+    }
+
     /// All vertices of a patch whose box lies before the near plane and inside the guard band.
     #[inline(always)]
     pub fn place<S: Simd>(&self, simd: S, vertices: &Vertices, patch: &Patch, placed: &mut Placed) {
         let (first, count) = (patch.first_vertex as usize, patch.vertices as usize);
-        placed.x.resize(count, 0);
-        placed.y.resize(count, 0);
-        placed.depth.resize(count, 0.0);
+        placed.corner.resize(count, [0; 4]);
         let round = f64x8::splat(simd, ROUND);
         let mut nearest = f32x16::splat(simd, 0.0);
         let mut done = 0;
@@ -112,22 +118,17 @@ impl Placing {
             let z = load(simd, &vertices.z, lo, hi);
             let low = self.project(simd, [x.0, y.0, z.0]);
             let high = self.project(simd, [x.1, y.1, z.1]);
-            let sx: fearless_simd::i32x16<S> =
-                simd.narrow_i64x8((low[0] + round).bitcast(), (high[0] + round).bitcast());
-            let sy: fearless_simd::i32x16<S> =
-                simd.narrow_i64x8((low[1] + round).bitcast(), (high[1] + round).bitcast());
+            let sx: i32x16<S> = simd.narrow_i64x8((low[0] + round).bitcast(), (high[0] + round).bitcast());
+            let sy: i32x16<S> = simd.narrow_i64x8((low[1] + round).bitcast(), (high[1] + round).bitcast());
             let depth = simd.narrow_f64x8(low[2], high[2]);
             nearest = nearest.max(depth);
             if wide {
-                sx.store_slice(&mut placed.x[done..][..16]);
-                sy.store_slice(&mut placed.y[done..][..16]);
-                depth.store_slice(&mut placed.depth[done..][..16]);
+                store_corners(simd, [sx, sy, depth.bitcast()], &mut placed.corner[done..][..16]);
                 done += 16;
             } else {
-                let (x, y, d): ([i32; 16], [i32; 16], [f32; 16]) = (sx.into(), sy.into(), depth.into());
-                placed.x[done..][..8].copy_from_slice(&x[..8]);
-                placed.y[done..][..8].copy_from_slice(&y[..8]);
-                placed.depth[done..][..8].copy_from_slice(&d[..8]);
+                let mut twice = [[0; 4]; 16];
+                store_corners(simd, [sx, sy, depth.bitcast()], &mut twice);
+                placed.corner[done..][..8].copy_from_slice(&twice[..8]);
                 done += 8;
             }
         }
@@ -149,6 +150,23 @@ impl Placing {
     }
 }
 
+/// Sixteen vertices' numbers, vertex by vertex.
+#[inline(always)]
+fn store_corners<S: Simd>(simd: S, [x, y, d]: [i32x16<S>; 3], to: &mut [[i32; 4]]) {
+    let (x, y, d) = (quarters(x), quarters(y), quarters(d));
+    let none = i32x4::splat(simd, 0);
+    for (q, four) in to.chunks_exact_mut(4).enumerate() {
+        i32x4::store_four_interleaved([x[q], y[q], d[q], none], four.as_flattened_mut());
+    }
+}
+
+#[inline(always)]
+fn quarters<S: Simd>(v: i32x16<S>) -> [i32x4<S>; 4] {
+    let (low, high) = v.split();
+    let ((a, b), (c, d)) = (low.split(), high.split());
+    [a, b, c, d]
+}
+
 /// Eight numbers from each of two places, as f64.
 #[inline(always)]
 fn load<S: Simd>(simd: S, list: &[f32], lo: usize, hi: usize) -> (f64x8<S>, f64x8<S>) {
@@ -159,10 +177,10 @@ fn load<S: Simd>(simd: S, list: &[f32], lo: usize, hi: usize) -> (f64x8<S>, f64x
 }
 
 /// Adding this rounds to a whole number, ties to even, whose low 32 bits are the sum's; for |v| < 2³¹.
-const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
+pub(super) const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
 
 #[inline(always)]
-fn dot<S: Simd>(simd: S, row: &[f64; 4], p: &[f64x8<S>; 3]) -> f64x8<S> {
+pub(super) fn dot<S: Simd>(simd: S, row: &[f64; 4], p: &[f64x8<S>; 3]) -> f64x8<S> {
     let xy = f64x8::splat(simd, row[0]) * p[0] + f64x8::splat(simd, row[1]) * p[1];
     (xy + f64x8::splat(simd, row[2]) * p[2]) + f64x8::splat(simd, row[3])
 }

@@ -4,6 +4,7 @@ use super::ask::{BoxView, BoxesOnScreen, project};
 use super::draw::Band;
 use super::{Frame, Occluder, OcclusionBuffer, Verdict};
 use crate::conventions::Projection;
+use crate::cull::Meaning;
 use crate::geometry::Aabb;
 use crate::index::Box3;
 use crate::raster::ScreenFromObject;
@@ -131,10 +132,17 @@ impl Frame {
     /// World space made ready for boxes.
     pub(in crate::cull) fn box_view(&self, screen_from_space: &ScreenFromObject) -> BoxView {
         let mut view = BoxView::new(screen_from_space, self.view.width, self.view.height);
+        view.centres = self.meaning == Meaning::Sampled;
         if let Some((metres, pixels)) = self.margin() {
             view.margin = [(metres as f32).next_up(), (pixels as f32).next_up()];
         }
         view
+    }
+
+    /// Whether boxes are to be widened by what objects may move.
+    #[inline(always)]
+    pub(in crate::cull) fn moves(&self) -> bool {
+        self.options.objects_move > 0.0
     }
 
     /// How far boxes are widened, metres.

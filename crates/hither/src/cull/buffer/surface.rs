@@ -27,6 +27,13 @@ impl TilePlane {
         f32x16::from_slice(simd, &COLUMNS) * self.per_column + (self.origin + row as f32 * self.per_row)
     }
 
+    /// The same for all rows.
+    #[inline(always)]
+    fn rows<S: Simd>(&self, simd: S) -> PlaneRows<S> {
+        let columns = f32x16::from_slice(simd, &COLUMNS);
+        PlaneRows { column: columns * self.per_column, origin: (columns * self.per_row + self.origin).into() }
+    }
+
     /// Smallest value over a rectangle of columns and rows (inclusive): floating-point sums are monotonic.
     #[inline(always)]
     pub fn min(&self, x0: i32, y0: i32, x1: i32, y1: i32) -> f32 {
@@ -34,7 +41,7 @@ impl TilePlane {
     }
 
     #[inline(always)]
-    fn max(&self) -> f32 {
+    pub fn max(&self) -> f32 {
         self.at(if self.per_column < 0.0 { 0 } else { 15 }, if self.per_row < 0.0 { 0 } else { 15 })
     }
 
@@ -50,6 +57,19 @@ impl TilePlane {
     #[inline(always)]
     fn size(&self) -> f32 {
         self.origin.abs() + 15.0 * (self.per_column.abs() + self.per_row.abs())
+    }
+}
+
+/// A plane over a tile, row by row: the bits of [`TilePlane::row`].
+struct PlaneRows<S: Simd> {
+    column: f32x16<S>,
+    origin: [f32; 16],
+}
+
+impl<S: Simd> PlaneRows<S> {
+    #[inline(always)]
+    fn row(&self, _simd: S, row: usize) -> f32x16<S> {
+        self.column + self.origin[row]
     }
 }
 
@@ -86,6 +106,10 @@ pub(super) struct Surface {
     cell_min: Vec<f32>,
     is_stale: Vec<bool>,
     stale: Vec<u32>,
+    /// Who raised a tile last, of those who said that they draw.
+    raised_by: Vec<u32>,
+    /// Who draws now.
+    pub drawing: u32,
 }
 
 impl Surface {
@@ -107,6 +131,8 @@ impl Surface {
             cell_min: vec![0.0; cells_x * cells_y],
             is_stale: vec![false; tiles],
             stale: Vec::new(),
+            raised_by: vec![0; tiles],
+            drawing: 0,
         };
         surface.clear();
         surface
@@ -162,6 +188,13 @@ impl Surface {
         self.min[tile / 16].0[tile % 16]
     }
 
+    /// As [`Surface::tile_min`], brought up to date first.
+    #[inline(always)]
+    pub fn tile_min_now<S: Simd>(&mut self, simd: S, tile: usize) -> f32 {
+        self.refresh_tile(simd, tile);
+        self.tile_min(tile)
+    }
+
     #[inline(always)]
     pub fn cell_min(&self, x: i32, y: i32) -> f32 {
         self.cell_min[y as usize * self.cells_x + x as usize]
@@ -185,6 +218,7 @@ impl Surface {
             self.kind[tile] = Kind::Plane;
             self.plane[tile] = plane;
             self.max[tile] = high;
+            self.raised_by[tile] = self.drawing;
             self.set_min(simd, tile, low);
             return;
         }
@@ -193,19 +227,28 @@ impl Surface {
             let at = &mut self.rows[tile * 16 + row].0;
             f32x16::from_slice(simd, at).max(plane.row(simd, row as i32)).store_slice(at);
         }
-        self.max[tile] = self.max[tile].max(high);
-        self.mark_stale(tile);
+        self.raised(tile, high);
+    }
+
+    /// Whether some of a tile lies beyond the image.
+    #[inline(always)]
+    fn is_at_border(&self, tile: usize) -> bool {
+        let (x, y) = self.corner(tile);
+        x + 16 > self.width || y + 16 > self.height
     }
 
     /// Makes a tile 256 depths, if it is not.
     #[inline(always)]
     pub fn open<S: Simd>(&mut self, simd: S, tile: usize) {
         if self.kind[tile] != Kind::Pixels {
-            self.spell_out(simd, tile);
+            simd.vectorize(
+                #[inline(always)]
+                || self.spell_out(simd, tile),
+            );
         }
     }
 
-    #[inline(never)]
+    #[inline(always)]
     fn spell_out<S: Simd>(&mut self, simd: S, tile: usize) {
         let plane = if self.kind[tile] == Kind::Plane { self.plane[tile] } else { TilePlane::ZERO };
         let (x, y) = self.corner(tile);
@@ -231,11 +274,76 @@ impl Surface {
         mask.select(old.max(depth), old).store_slice(at);
     }
 
+    /// Raises the pixels of a tile that lie in spans of its rows: first and last column. `rows` are those whose
+    /// span is not empty. No depth is above `highest`.
+    #[inline(always)]
+    pub fn raise_spans<S: Simd>(
+        &mut self,
+        simd: S,
+        tile: usize,
+        [from, to]: [f32x16<S>; 2],
+        rows: u32,
+        plane: TilePlane,
+        highest: f32,
+    ) {
+        let fresh = self.kind[tile] == Kind::Empty && !self.is_at_border(tile);
+        if fresh {
+            self.kind[tile] = Kind::Pixels;
+        } else {
+            self.open(simd, tile);
+        }
+        let (from, to): ([f32; 16], [f32; 16]) = (from.into(), to.into());
+        let columns = f32x16::from_slice(simd, &COLUMNS);
+        let depths = plane.rows(simd);
+        let (first, last) =
+            (rows.trailing_zeros() as usize & 15, 31 - (rows | 1).leading_zeros() as usize & 15);
+        let all = &mut self.rows[tile * 16..][..16];
+        let zero = f32x16::splat(simd, 0.0);
+        let mut least = f32x16::splat(simd, f32::INFINITY);
+        for (at, row) in all.iter_mut().enumerate() {
+            let old = if fresh { zero } else { f32x16::from_slice(simd, &row.0) };
+            let mut new = old;
+            if at >= first && at <= last {
+                let covered = columns.simd_ge(from[at]) & columns.simd_le(to[at]);
+                new = covered.select(old.max(depths.row(simd, at)), old);
+                new.store_slice(&mut row.0);
+            } else if fresh {
+                zero.store_slice(&mut row.0);
+            }
+            least = least.min(new);
+        }
+        self.max[tile] = self.max[tile].max(highest);
+        self.raised_by[tile] = self.drawing;
+        self.set_min(simd, tile, least.reduce_min());
+    }
+
+    /// Which tiles of a cell hold something that is not nearer than `depth`, of those that meet `rect`.
+    #[inline(always)]
+    pub fn tiles_beyond<S: Simd>(&self, simd: S, x: i32, y: i32, rect: [i32; 4], depth: f32) -> u32 {
+        let cell = y as usize * self.cells_x + x as usize;
+        if self.cell_min[cell] >= depth {
+            return 0;
+        }
+        let [left, top] = [(rect[0] >> 4) - x * 4, (rect[1] >> 4) - y * 4];
+        let [right, bottom] = [(rect[2] >> 4) - x * 4, (rect[3] >> 4) - y * 4];
+        let columns = (15u32 << left.max(0)) & (15 >> (3 - right.min(3)));
+        let rows = (0xFFFFu32 << (top.max(0) * 4)) & (0xFFFF >> ((3 - bottom.min(3)) * 4));
+        let farther = f32x16::from_slice(simd, &self.min[cell].0).simd_lt(depth).to_bitmask() as u32;
+        farther & (columns & 15) * 0x1111 & rows
+    }
+
     /// Says that pixels of an open tile were raised, none above `highest`.
     #[inline(always)]
     pub fn raised(&mut self, tile: usize, highest: f32) {
         self.max[tile] = self.max[tile].max(highest);
+        self.raised_by[tile] = self.drawing;
         self.mark_stale(tile);
+    }
+
+    /// Who raised the tile in the middle of a rectangle last.
+    #[inline(always)]
+    pub fn raised_by(&self, [left, top, right, bottom]: [i32; 4]) -> u32 {
+        self.raised_by[self.tile((left + right) >> 5, (top + bottom) >> 5)]
     }
 
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! Culling a scene: which instances may be seen, front to back.
 //!
 //! ```text
-//! draw what hid something last time, largest first
+//! draw what hid something last time, what hid most first
 //! walk the index nearest first:
 //!     a box that the buffer hides, or that is outside: drop it, with all that is in it
 //!     an instance: if one of the boxes of its mesh's tree shows, it may be seen;
@@ -10,19 +10,22 @@
 //! ```
 //!
 //! *Occluders* are chosen by size on the screen: an instance is drawn if its box covers so many pixels, and of
-//! its surface the pieces that are large enough. Masked and transparent surfaces never hide. Nothing is kept of
+//! its surface the pieces that are large enough. With coherence each box that is found hidden counts for who was drawn
+//! last in its middle, and an occluder that nothing counted for is not tried again for some frames. Masked and transparent surfaces never hide. Nothing is kept of
 //! where an occluder is, so one that moves or is switched off costs nothing but its place in the index.
 //!
 //! The verdicts are those of the conservative buffer: an instance that is left out shows at no point of the
-//! continuous image.
+//! continuous image; or, with [`Meaning::Sampled`], at no pixel's centre.
 
 mod walk;
 
+use super::Meaning;
 use super::buffer::{Band, Frame, Occluder, OcclusionOptions};
 use crate::conventions::{View, ViewError};
 use crate::index::SceneIndex;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// What may be chosen about culling a scene.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +34,8 @@ pub struct CullOptions {
     pub eye_moves: f64,
     /// How far each object may move, metres, while the answer is to stay true.
     pub objects_move: f64,
+    /// Where an instance must show. Sampled, with nothing that moves.
+    pub meaning: Meaning,
     /// Instances whose boxes cover fewer pixels than this are not drawn as occluders. Smaller hides more, and
     /// costs more.
     pub least_occluder_px: u32,
@@ -41,7 +46,8 @@ pub struct CullOptions {
     pub least_px_a_face: u32,
     /// Boxes of a mesh's own tree that are asked about before an instance counts as visible.
     pub boxes_an_instance: u32,
-    /// Start by drawing what hid something in this culler's last frame of the same view number.
+    /// Start by drawing what hid something in this culler's last frame of the same view number, what hid most
+    /// first; leave out for some frames what was drawn and hid nothing.
     pub coherence: bool,
     /// Also say of every instance why it was judged as it was; slower.
     pub reasons: bool,
@@ -54,6 +60,7 @@ impl Default for CullOptions {
         CullOptions {
             eye_moves: 0.0,
             objects_move: 0.0,
+            meaning: Meaning::Continuous,
             least_occluder_px: 400,
             least_piece_px: 6,
             least_px_a_face: 4,
@@ -72,7 +79,7 @@ pub enum Reason {
     Shows,
     /// It reaches the near plane.
     ReachesNearPlane,
-    /// Nothing of it is before the near plane and inside the picture's sides.
+    /// Nothing of it is before the near plane and inside the picture's sides; sampled, nothing at a pixel's centre.
     OutsideView,
     /// Occluders hide a box around it, or around the group that it is in.
     BoxHidden,
@@ -102,6 +109,8 @@ pub struct CullCounters {
     pub boxes_hidden: u64,
     /// Instances drawn as occluders.
     pub occluders: u64,
+    /// Instances not drawn because they hid nothing lately.
+    pub occluders_idle: u64,
     /// Connected pieces of these that were drawn.
     pub occluder_patches: u64,
     /// Faces of these.
@@ -134,9 +143,23 @@ pub struct Culler {
 #[derive(Debug, Default)]
 struct OneView {
     band: Option<Band>,
-    /// Instances drawn as occluders, with the pixels that they covered.
-    hid: Vec<(u32, u32)>,
+    /// Instances drawn as occluders in the last frame, those that hid most first.
+    hid: Vec<Hid>,
+    /// Instances that hid nothing when they were last drawn, and for how many frames they are not tried again.
+    idle: HashMap<u32, u32>,
 }
+
+/// An instance drawn as an occluder.
+#[derive(Clone, Copy, Debug)]
+struct Hid {
+    instance: u32,
+    /// Boxes found hidden, in the middle of which it was drawn last.
+    boxes: u32,
+}
+
+/// An occluder that hid nothing is left out for so many frames, or up to twice as many, so that not all are tried
+/// again in the same frame.
+const IDLE_FRAMES: u32 = 8;
 
 impl Culler {
     /// A culler that knows nothing yet.
@@ -180,8 +203,8 @@ impl Culler {
             objects_move: options.objects_move,
             level: options.level,
         };
-        let frames: Vec<Frame> =
-            views.iter().map(|view| Frame::new(view, &choice)).collect::<Result<_, _>>()?;
+        let frame = |view| Frame::new(view, &choice)?.meaning(options.meaning);
+        let frames: Vec<Frame> = views.iter().map(frame).collect::<Result<_, _>>()?;
         self.prepare(index);
         self.views.resize_with(views.len(), OneView::default);
         let occluders = &self.occluders;
@@ -191,6 +214,12 @@ impl Culler {
             _ => self.views.par_iter_mut().zip(&frames).map(one).collect(),
         })
     }
+}
+
+/// What is known from the last frame.
+struct Before<'a> {
+    hid: &'a [Hid],
+    idle: &'a HashMap<u32, u32>,
 }
 
 impl OneView {
@@ -209,12 +238,23 @@ impl OneView {
             }
             _ => Band::new(width, 0, height),
         };
-        let before = if options.coherence { std::mem::take(&mut self.hid) } else { Vec::new() };
-        self.hid.clear();
+        let before = std::mem::take(&mut self.hid);
+        if !options.coherence {
+            self.idle.clear();
+        }
+        let before = Before { hid: if options.coherence { &before } else { &[] }, idle: &self.idle };
         let culling = dispatch!(options.level, simd => {
             walk::cull(simd, index, occluders, frame, options, &mut band, &before, &mut self.hid)
         });
-        self.hid.sort_unstable_by_key(|&(instance, pixels)| (std::cmp::Reverse(pixels), instance));
+        self.hid.sort_unstable_by_key(|h| (std::cmp::Reverse(h.boxes), h.instance));
+        self.idle.retain(|_, frames| {
+            *frames -= 1;
+            *frames > 0
+        });
+        let useful = self.hid.partition_point(|h| h.boxes > 0);
+        for idle in self.hid.drain(useful..) {
+            self.idle.insert(idle.instance, IDLE_FRAMES + idle.instance % IDLE_FRAMES);
+        }
         self.band = Some(band);
         culling
     }

@@ -47,6 +47,31 @@ fn what_shows_is_never_left_out() {
     assert!(left_out > 100, "{left_out} of {total} left out");
 }
 
+#[test]
+fn what_shows_at_a_pixel_centre_is_never_left_out_when_sampled() {
+    let mut culler = Culler::new();
+    let (mut continuous, mut sampled) = (0, 0);
+    for seed in 0..600 {
+        let index = SceneIndex::build(trouble::scene(seed), &IndexOptions::default());
+        let view = trouble::view(seed);
+        let picture = zbuffer::draw(index.scene(), &view);
+        let pixels = (0..view.height).flat_map(|y| (0..view.width).map(move |x| (x, y)));
+        let shown: HashSet<u32> =
+            pixels.filter_map(|(x, y)| picture.seen(x, y)).map(|(id, _)| id.instance).collect();
+        let options = CullOptions { least_occluder_px: 0, least_piece_px: 0, ..CullOptions::default() };
+        continuous += culler.cull(&index, &view, &options).unwrap().visible.len();
+        let options = CullOptions { meaning: Meaning::Sampled, ..options };
+        let found = culler.cull(&index, &view, &options).unwrap();
+        let visible: HashSet<u32> = found.visible.iter().copied().collect();
+        assert!(shown.is_subset(&visible), "seed {seed}: {shown:?} show, {visible:?} were found");
+        sampled += visible.len();
+    }
+    assert!(sampled < continuous, "{sampled} sampled, {continuous} in the continuous image");
+    let index = SceneIndex::build(trouble::scene(1), &IndexOptions::default());
+    let moving = CullOptions { meaning: Meaning::Sampled, eye_moves: 0.1, ..CullOptions::default() };
+    assert!(cull(&index, &trouble::view(1), &moving).is_err());
+}
+
 fn every_instance_is_judged_once(index: &SceneIndex, found: &Culling) {
     let mut times = vec![0; index.scene().instance_count() as usize];
     for judged in &found.judged {

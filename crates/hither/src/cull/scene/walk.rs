@@ -1,18 +1,26 @@
 //! The nearest-first walk of a scene's nested trees that draws occluders and drops what they hide.
 
-use super::{CullCounters, CullOptions, Culling, Judged, Reason};
-use crate::cull::buffer::{Band, Drawn, Frame, Occluder, project};
-use crate::index::{Child, GroupIndex, SceneIndex, Slot, WideTree};
+use super::{Before, CullCounters, CullOptions, Culling, Hid, Judged, Reason};
+use crate::cull::buffer::{Band, BoxView, Drawn, Frame, Occluder, project};
+use crate::index::{Child, GroupIndex, SceneIndex, Slot, WideNode, WideTree};
 use crate::raster::ScreenFromObject;
 use crate::scene::Content;
 use fearless_simd::Simd;
 use std::cmp::Ordering;
-use std::collections::{BinaryHeap, HashSet};
+use std::collections::{BinaryHeap, HashMap, HashSet};
+
+/// A mesh's box of so many pixels is worth one more question about the boxes inside.
+const PX_A_BOX: u32 = 4;
+
+/// An instance whose box covers no more pixels is taken for what its box is.
+const PX_OF_A_SPECK: u32 = 16;
 
 /// A group entered with a transform.
 struct Context<'a> {
     group: &'a GroupIndex,
     at: ScreenFromObject,
+    /// The same, ready for boxes.
+    boxes: BoxView,
     /// Number of its first instance.
     first: u32,
 }
@@ -54,8 +62,10 @@ impl Eq for Open {}
 /// An instance that may be seen, as far as is known.
 struct Seen {
     instance: u32,
-    mesh: u32,
-    at: ScreenFromObject,
+    /// Where its box lies and how near it comes; `cut` if it may not be hidden, whatever is there.
+    rect: [i32; 4],
+    depth: f32,
+    cut: bool,
     /// How many occluders had been drawn when it was judged.
     occluders: u64,
 }
@@ -69,8 +79,12 @@ struct Walk<'a> {
     contexts: Vec<Context<'a>>,
     open: BinaryHeap<Open>,
     seen: Vec<Seen>,
+    /// Nodes of a mesh's tree to look at.
+    stack: Vec<u32>,
+    /// Occluders drawn before the walk.
     drawn: HashSet<u32>,
-    hid: &'a mut Vec<(u32, u32)>,
+    idle: &'a HashMap<u32, u32>,
+    hid: &'a mut Vec<Hid>,
     counters: CullCounters,
     judged: Vec<Judged>,
 }
@@ -84,8 +98,8 @@ pub(super) fn cull<S: Simd>(
     frame: &Frame,
     options: &CullOptions,
     band: &mut Band,
-    before: &[(u32, u32)],
-    hid: &mut Vec<(u32, u32)>,
+    before: &Before,
+    hid: &mut Vec<Hid>,
 ) -> Culling {
     let mut walk = Walk {
         index,
@@ -96,14 +110,17 @@ pub(super) fn cull<S: Simd>(
         contexts: Vec::new(),
         open: BinaryHeap::new(),
         seen: Vec::new(),
+        stack: Vec::new(),
         drawn: HashSet::new(),
+        idle: before.idle,
         hid,
         counters: CullCounters::default(),
         judged: Vec::new(),
     };
-    for &(instance, pixels) in before {
+    for &Hid { instance, .. } in before.hid {
         if let Some((mesh, at)) = screen_from_instance(index, frame.screen_from_world, instance) {
-            walk.draw(simd, instance, mesh, at, pixels);
+            walk.draw(simd, instance, mesh, at);
+            walk.drawn.insert(instance);
         }
     }
     walk.enter(simd, index.scene().root, frame.screen_from_world, 0);
@@ -111,6 +128,7 @@ pub(super) fn cull<S: Simd>(
         walk.counters.boxes_asked += 1;
         if !open.cut && walk.band.hides(simd, open.rect, open.depth) {
             walk.counters.boxes_hidden += 1;
+            walk.credit(open.rect);
             walk.judge(open.context, open.slot, open.moving, Reason::BoxHidden);
             continue;
         }
@@ -128,7 +146,8 @@ impl<'a> Walk<'a> {
     fn enter<S: Simd>(&mut self, simd: S, group: u32, at: ScreenFromObject, first: u32) {
         let group = &self.index.groups[group as usize];
         let context = self.contexts.len() as u32;
-        self.contexts.push(Context { group, at, first });
+        let boxes = self.frame.box_view(&at);
+        self.contexts.push(Context { group, at, boxes, first });
         for (tree, moving) in [(&group.resting, false), (&group.moving, true)] {
             if !tree.nodes.is_empty() {
                 self.visit(simd, context, moving, 0);
@@ -141,11 +160,18 @@ impl<'a> Walk<'a> {
         let c = &self.contexts[context as usize];
         let tree: &'a WideTree = if moving { &c.group.moving } else { &c.group.resting };
         let node = &tree.nodes[node as usize];
-        let view = self.frame.box_view(&c.at);
-        let (min, max) = self.frame.widened(&node.min, &node.max, &c.at);
+        let view = c.boxes;
+        let wide;
+        let (min, max) = match self.frame.moves() {
+            false => (&node.min, &node.max),
+            true => {
+                wide = self.frame.widened(&node.min, &node.max, &c.at);
+                (&wide.0, &wide.1)
+            }
+        };
         let boxes = simd.vectorize(
             #[inline(always)]
-            || project(simd, &view, &min, &max),
+            || project(simd, &view, min, max),
         );
         self.counters.boxes_projected += u64::from(node.used);
         for lane in 0..node.used as usize {
@@ -171,41 +197,63 @@ impl<'a> Walk<'a> {
     fn visit_item<S: Simd>(&mut self, simd: S, open: &Open, item: u32) {
         let c = &self.contexts[open.context as usize];
         let item = &c.group.items[item as usize];
+        let [left, top, right, bottom] = open.rect;
+        let pixels = ((right - left + 1) * (bottom - top + 1)) as u32;
+        if pixels <= PX_OF_A_SPECK && open.depth < f32::INFINITY && matches!(item.content, Content::Mesh(_)) {
+            return self.take_for_visible(open, c.first + item.first_instance, Reason::Shows);
+        }
         let (at, instance) = (c.at.after(&item.group_from_content), c.first + item.first_instance);
         let mesh = match item.content {
             Content::Group(group) => return self.enter(simd, group, at, instance),
             Content::Mesh(mesh) => mesh,
             Content::Nothing => return,
         };
-        match self.mesh_shows(simd, mesh, &at) {
+        match self.mesh_shows(simd, mesh, &at, pixels) {
             Shows::No(reason) => self.judge_one(instance, reason),
             Shows::Yes(reason) => {
-                self.judge_one(instance, reason);
-                let occluders = self.counters.occluders;
-                self.seen.push(Seen { instance, mesh, at, occluders });
-                let [left, top, right, bottom] = open.rect;
-                let pixels = ((right - left + 1) * (bottom - top + 1)) as u32;
-                if pixels >= self.options.least_occluder_px {
-                    self.draw(simd, instance, mesh, at, pixels);
+                self.take_for_visible(open, instance, reason);
+                if pixels >= self.options.least_occluder_px && !self.drawn.contains(&instance) {
+                    self.draw(simd, instance, mesh, at);
                 }
             }
         }
     }
 
-    /// Draws an instance's opaque surface, once.
+    /// Counts a hidden box for the occluder that hides it.
     #[inline(always)]
-    fn draw<S: Simd>(&mut self, simd: S, instance: u32, mesh: u32, at: ScreenFromObject, pixels: u32) {
+    fn credit(&mut self, rect: [i32; 4]) {
+        let who = self.band.who_hides(rect) as usize;
+        if let Some(hid) = self.hid.get_mut(who) {
+            hid.boxes += 1;
+        }
+    }
+
+    fn take_for_visible(&mut self, open: &Open, instance: u32, reason: Reason) {
+        self.judge_one(instance, reason);
+        let occluders = self.counters.occluders;
+        let &Open { rect, depth, cut, .. } = open;
+        self.seen.push(Seen { instance, rect, depth, cut, occluders });
+    }
+
+    /// Draws an instance's opaque surface.
+    #[inline(always)]
+    fn draw<S: Simd>(&mut self, simd: S, instance: u32, mesh: u32, at: ScreenFromObject) {
         let occluder = &self.occluders[mesh as usize];
-        if occluder.is_empty() || !self.drawn.insert(instance) {
+        if occluder.is_empty() {
             return;
         }
+        if !self.idle.is_empty() && self.idle.contains_key(&instance) {
+            self.counters.occluders_idle += 1;
+            return;
+        }
+        self.band.drawing(self.hid.len() as u32);
         let mut standing = self.frame.standing_at(occluder, at);
         standing.least_px = standing.least_px.max(self.options.least_piece_px as i32);
         standing.px_a_face = self.options.least_px_a_face as i32;
         let mut drawn = Drawn::default();
         self.band.draw(simd, &standing, &mut drawn);
         if drawn.patches > 0 {
-            self.hid.push((instance, pixels));
+            self.hid.push(Hid { instance, boxes: 0 });
         }
         self.counters.occluders += 1;
         self.counters.occluder_patches += drawn.patches;
@@ -213,62 +261,26 @@ impl<'a> Walk<'a> {
     }
 
     /// Whether one of the boxes in a mesh's trees shows, nearest first, down to its blocks of triangles, as long
-    /// as there are not too many to ask about.
+    /// as there are not too many to ask about. `pixels` are those of the box around it.
     #[inline(always)]
-    fn mesh_shows<S: Simd>(&mut self, simd: S, mesh: u32, at: &ScreenFromObject) -> Shows {
+    fn mesh_shows<S: Simd>(&mut self, simd: S, mesh: u32, at: &ScreenFromObject, pixels: u32) -> Shows {
         let mesh = &self.index.meshes[mesh as usize];
         let view = self.frame.box_view(at);
-        let mut left = self.options.boxes_an_instance;
+        // Finer than a few pixels, boxes tell little that the whole's does not.
+        let mut left = self.options.boxes_an_instance.min(pixels / PX_A_BOX);
         let mut inside = false;
         for tree in [&mesh.solid.tree, &mesh.blended.tree] {
             if tree.nodes.is_empty() {
                 continue;
             }
-            let mut stack = vec![0u32];
-            while let Some(node) = stack.pop() {
-                let node = &tree.nodes[node as usize];
-                let (min, max) = self.frame.widened(&node.min, &node.max, at);
-                let boxes = simd.vectorize(
-                    #[inline(always)]
-                    || project(simd, &view, &min, &max),
-                );
-                self.counters.boxes_projected += u64::from(node.used);
-                let mut lanes = [0u8; 16];
-                let mut count = 0;
-                for lane in 0..node.used as usize {
-                    if boxes.inside >> lane & 1 == 0 || node.child[lane] == Slot::EMPTY {
-                        continue;
-                    }
-                    inside = true;
-                    if boxes.depth[lane] == f32::INFINITY {
-                        return Shows::Yes(Reason::ReachesNearPlane);
-                    }
-                    if view.margin[0] > 0.0 && boxes.uncut >> lane & 1 == 0 {
-                        return Shows::Yes(Reason::Shows);
-                    }
-                    self.counters.boxes_asked += 1;
-                    let rect = [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]];
-                    if self.band.hides(simd, rect, boxes.depth[lane]) {
-                        self.counters.boxes_hidden += 1;
-                        continue;
-                    }
-                    // The farthest first: the last is popped first.
-                    let mut at = count;
-                    lanes[count] = lane as u8;
-                    count += 1;
-                    while at > 0 && boxes.depth[usize::from(lanes[at - 1])] > boxes.depth[lane] {
-                        lanes.swap(at, at - 1);
-                        at -= 1;
-                    }
+            self.stack.clear();
+            self.stack.push(0);
+            while let Some(node) = self.stack.pop() {
+                match self.node_shows(simd, &tree.nodes[node as usize], &view, at, &mut inside) {
+                    Some(reason) => return Shows::Yes(reason),
+                    None => left = left.saturating_sub(tree.nodes[node as usize].used),
                 }
-                for &lane in &lanes[..count] {
-                    match node.child[usize::from(lane)].child() {
-                        Child::Leaf(_) => return Shows::Yes(Reason::Shows),
-                        Child::Node(node) => stack.push(node),
-                    }
-                }
-                left = left.saturating_sub(node.used);
-                if left == 0 && !stack.is_empty() {
+                if left == 0 && !self.stack.is_empty() {
                     return Shows::Yes(Reason::Shows);
                 }
             }
@@ -276,26 +288,83 @@ impl<'a> Walk<'a> {
         Shows::No(if inside { Reason::PartsHidden } else { Reason::OutsideView })
     }
 
-    /// Asks again about everything, and puts the answer together.
+    /// Why a node of a mesh's tree shows for certain, as far as boxes can say; its children that may show, but have
+    /// children themselves, go onto the stack, the nearest last.
+    #[inline(always)]
+    fn node_shows<S: Simd>(
+        &mut self,
+        simd: S,
+        node: &WideNode,
+        view: &BoxView,
+        at: &ScreenFromObject,
+        inside: &mut bool,
+    ) -> Option<Reason> {
+        let wide;
+        let (min, max) = match self.frame.moves() {
+            false => (&node.min, &node.max),
+            true => {
+                wide = self.frame.widened(&node.min, &node.max, at);
+                (&wide.0, &wide.1)
+            }
+        };
+        let boxes = simd.vectorize(
+            #[inline(always)]
+            || project(simd, view, min, max),
+        );
+        self.counters.boxes_projected += u64::from(node.used);
+        let first = self.stack.len();
+        let mut depths = [0.0; 16];
+        let mut rest = u32::from(boxes.inside) & (0xFFFF >> (16 - node.used));
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize & 15;
+            rest &= rest - 1;
+            if node.child[lane] == Slot::EMPTY {
+                continue;
+            }
+            *inside = true;
+            if boxes.depth[lane] == f32::INFINITY {
+                return Some(Reason::ReachesNearPlane);
+            }
+            if view.margin[0] > 0.0 && boxes.uncut >> lane & 1 == 0 {
+                return Some(Reason::Shows);
+            }
+            self.counters.boxes_asked += 1;
+            let rect = [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]];
+            if self.band.hides(simd, rect, boxes.depth[lane]) {
+                self.counters.boxes_hidden += 1;
+                self.credit(rect);
+                continue;
+            }
+            let Child::Node(child) = node.child[lane].child() else { return Some(Reason::Shows) };
+            let mut to = self.stack.len();
+            self.stack.push(child);
+            depths[to - first] = boxes.depth[lane];
+            while to > first && depths[to - first - 1] > depths[to - first] {
+                self.stack.swap(to, to - 1);
+                depths.swap(to - first, to - first - 1);
+                to -= 1;
+            }
+        }
+        None
+    }
+
+    /// Asks again about the boxes of all that was taken for visible, and puts the answer together.
     #[inline(always)]
     fn finish<S: Simd>(mut self, simd: S) -> Culling {
         let seen = std::mem::take(&mut self.seen);
         let mut visible = Vec::with_capacity(seen.len());
         for one in &seen {
-            // Nothing was drawn since.
-            if one.occluders == self.counters.occluders {
+            // Something was drawn since, and it may be hidden.
+            let anew = one.occluders != self.counters.occluders && !one.cut;
+            if !(anew && self.band.hides(simd, one.rect, one.depth)) {
                 visible.push(one.instance);
                 continue;
             }
-            match self.mesh_shows(simd, one.mesh, &one.at) {
-                Shows::Yes(_) => visible.push(one.instance),
-                Shows::No(_) => {
-                    self.counters.second_thoughts += 1;
-                    if self.options.reasons {
-                        self.judged.retain(|j| j.instances != (one.instance..one.instance + 1));
-                        self.judge_one(one.instance, Reason::HiddenAfterAll);
-                    }
-                }
+            self.counters.second_thoughts += 1;
+            self.credit(one.rect);
+            if self.options.reasons {
+                self.judged.retain(|j| j.instances != (one.instance..one.instance + 1));
+                self.judge_one(one.instance, Reason::HiddenAfterAll);
             }
         }
         Culling { visible, judged: self.judged, counters: self.counters }

@@ -1,0 +1,331 @@
+//! Patches of many small faces: coverage from the outline alone, depth from the faces' corners.
+//!
+//! ```text
+//! 1. which faces turn to the eye: sixteen planes at a time
+//! 2. depth: each face that is drawn lowers the pixels of the rectangle around it to its farthest corner
+//! 3. the outline: edges between faces that are drawn and faces that are not, or that turn the other way
+//! 4. the count of each pixel: going down a column of pixel centres, the outline's edges that are crossed, each
+//!    +1 or −1; less one where an edge of the outline touches the pixel with its centre on the inner side
+//! 5. pixels whose count is at least one get their depth
+//! ```
+//!
+//! *Count.* How many faces of a chain cover a point, each with the sign of its turn, is how often the chain's
+//! boundary winds around the point, and that is the sum of the boundary's crossings with a ray. So step 4
+//! yields the N(c) of [`super`] without looking at a face, for any choice in step 1: an outline around what is
+//! taken is all that it needs. What step 1 takes for a front and is none counts with its true sign, and only
+//! lessens the count.
+//!
+//! *Ties.* Crossings are taken as if every centre were moved by (ε, ε²), which is what the fill rule says:
+//! columns from an edge's smallest x (inclusive) to its largest (exclusive), and a point on an edge inside if the
+//! edge goes up, or level to the right.
+//!
+//! *Rows of crossings* are quotients of whole numbers below 2⁵³ by a step of at most 2²³, taken in f64. Such a
+//! quotient that is not whole is at least 2⁻²³ from a whole number, and near the patch, at most 2²⁰ in
+//! magnitude, the computed one is off by less than 2⁻³⁰: rounding it after moving it by 2⁻³⁰ is exact.
+
+use super::fill::{first_pixel, last_pixel};
+use super::fine::FinePatch;
+use super::place::{Placed, ROUND};
+use super::surface::Surface;
+use crate::raster::ScreenFromObject;
+use fearless_simd::{Simd, f32x16, f64x8, i32x4, i32x16, mask32x16, prelude::*, u64x8};
+
+/// The eye in the space of an occluder: a point (1 at the end), or the direction towards it (0).
+pub(super) fn eye_in_object(at: &ScreenFromObject) -> [f32; 4] {
+    let row = |r: &[f64; 4]| glam::DVec3::new(r[0], r[1], r[2]);
+    let (x, y, w) = (row(&at.x), row(&at.y), row(&at.w));
+    if at.perspective {
+        let sum = y.cross(w) * at.x[3] + w.cross(x) * at.y[3] + x.cross(y) * at.w[3];
+        let eye = -sum / x.dot(y.cross(w));
+        [eye.x as f32, eye.y as f32, eye.z as f32, 1.0]
+    } else {
+        let across = x.cross(y).normalize_or_zero();
+        let towards = across * across.dot(row(&at.d)).signum();
+        [towards.x as f32, towards.y as f32, towards.z as f32, 0.0]
+    }
+}
+
+/// A patch in its place.
+pub(super) struct Drawing<'a> {
+    pub patch: FinePatch<'a>,
+    pub placed: &'a Placed,
+    /// [`eye_in_object`].
+    pub eye: [f32; 4],
+    /// Sign of the area of faces that are seen from the front.
+    pub front_sign: i32,
+    /// How far a corner may be from its true place, 1/256 pixel.
+    pub slack: i32,
+    /// Pixels of the surface that it may touch.
+    pub rect: [i32; 4],
+}
+
+/// Sixteen pixels of a row.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Sixteen([i32; 16]);
+
+/// Pixels around a patch, sixteen columns after another, and in them row after row.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Mosaic {
+    /// Bits of the least depth of the faces that may touch a pixel.
+    depth: Vec<Sixteen>,
+    /// By how much a pixel's count differs from that of the pixel above.
+    step: Vec<Sixteen>,
+    /// Turn of each face: 1 front, −1 back, 0 not drawn; and one more 0, for where the surface ends.
+    turn: Vec<i8>,
+    /// Edges at which what is drawn ends: the vertices, in the order of the face, and its turn.
+    outline: Vec<(u16, u16, i8)>,
+}
+
+/// What part of the surface a patch is drawn in.
+#[derive(Clone, Copy)]
+struct Area {
+    /// Columns and rows (inclusive) of the surface.
+    rect: [i32; 4],
+    /// Image row of the surface's first.
+    band: i32,
+    /// First column, a multiple of sixteen.
+    left: i32,
+    /// Rows of the rectangle.
+    rows: usize,
+}
+
+impl Area {
+    /// Sixteens that a column of sixteens takes: a row more than are seen, so that what ends below has a place.
+    fn stride(&self) -> usize {
+        self.rows + 1
+    }
+}
+
+/// A pixel that no face touches.
+const NO_DEPTH: i32 = i32::MAX;
+
+impl Mosaic {
+    /// Draws a patch. Returns how many faces were drawn.
+    #[inline(always)]
+    pub fn draw<S: Simd>(&mut self, simd: S, surface: &mut Surface, drawing: &Drawing) -> u64 {
+        let &Drawing { patch, placed, eye, front_sign, slack, rect } = drawing;
+        let left = rect[0] & !15;
+        let area = Area { rect, band: surface.top, left, rows: (rect[3] - rect[1] + 1) as usize };
+        let size = area.stride() * (((rect[2] - left) >> 4) + 1) as usize;
+        if self.depth.len() < size {
+            self.depth.resize(size, Sixteen([NO_DEPTH; 16]));
+            self.step.resize(size, Sixteen([0; 16]));
+        }
+        self.take_turns(simd, &patch, eye);
+        let drawn = self.lower_depths(simd, &area, &patch, placed, slack);
+        for at in 0..self.outline.len() {
+            let (from, to, turn) = self.outline[at];
+            let (p, q) = (placed.corner[usize::from(from)], placed.corner[usize::from(to)]);
+            self.count_edge(simd, &area, p, q, front_sign * i32::from(turn), slack);
+        }
+        self.finish(simd, surface, &area, placed.nearest);
+        drawn
+    }
+
+    #[inline(always)]
+    fn take_turns<S: Simd>(&mut self, simd: S, patch: &FinePatch, eye: [f32; 4]) {
+        let faces = patch.face.len();
+        self.turn.clear();
+        self.turn.resize(faces + 1, 0);
+        let zero = f32x16::splat(simd, 0.0);
+        let back = i8::from(patch.two_sided);
+        for (planes, turns) in patch.plane.iter().zip(self.turn.chunks_exact_mut(16)) {
+            let [nx, ny, nz, d] = &planes.0;
+            let x = f32x16::from_slice(simd, nx) * eye[0];
+            let y = f32x16::from_slice(simd, ny) * eye[1];
+            let z = f32x16::from_slice(simd, nz) * eye[2];
+            let w = f32x16::from_slice(simd, d) * eye[3];
+            let side = x + y + z - w;
+            let (front, behind) = (side.simd_gt(zero).to_bitmask(), side.simd_lt(zero).to_bitmask());
+            for (lane, turn) in turns.iter_mut().enumerate() {
+                *turn = (front >> lane & 1) as i8 - (behind >> lane & 1) as i8 * back;
+            }
+        }
+    }
+
+    // long because its steps share the registers of eight columns
+    /// Counts an edge of the outline, that runs around a face of `turn`, in the columns that it touches.
+    #[inline(always)]
+    fn count_edge<S: Simd>(&mut self, simd: S, area: &Area, p: [i32; 4], q: [i32; 4], turn: i32, slack: i32) {
+        let (dx, dy) = ((q[0] - p[0]) * turn, (q[1] - p[1]) * turn);
+        let (low, high) = (p[0].min(q[0]), p[0].max(q[0]));
+        // Columns whose centres the edge passes over, and those that it touches.
+        let passes = [(low + 127) >> 8, (high - 129) >> 8];
+        let touches = [first_pixel(low, slack), last_pixel(high, slack)];
+        let rows = [first_pixel(p[1].min(q[1]), slack), last_pixel(p[1].max(q[1]), slack)];
+        let top = area.rect[1] + area.band;
+        let [first_row, last_row] = [(rows[0] - top).max(0), (rows[1] - top).min(area.rows as i32 - 1)];
+        let [first, last] = [touches[0].max(area.rect[0]), touches[1].min(area.rect[2])];
+        if first > last || (first_row > last_row && rows[0] - top > area.rows as i32) {
+            return;
+        }
+        // Positive inside, at centres: e = b·y − dy·x + c, in whole numbers.
+        let owned = dy < 0 || (dy == 0 && dx > 0);
+        let from = [i64::from(128 - p[0]), i64::from(256 * top + 128 - p[1])];
+        let c = (i64::from(dx) * from[1] - i64::from(dy) * from[0] - i64::from(!owned)) >> 8;
+        let size = i64::from(dx.abs()) + i64::from(dy.abs());
+        let least = -((size * i64::from(slack) + 256) >> 8);
+        let most = (size * i64::from(128 + slack)) >> 8;
+        let stride = area.stride();
+        let column = f64x8::from_slice(simd, &EIGHT);
+        let (bias, round) = (1.0 / f64::from(1 << 30), f64x8::splat(simd, ROUND));
+        let (zero, end) = (f64x8::splat(simd, 0.0), f64x8::splat(simd, area.rows as f64));
+        let (first_f, last_f) = (f64::from(first_row), f64::from(last_row));
+        if dx == 0 {
+            // No crossings; a column is touched or not.
+            for x in first..=last {
+                let e = c - i64::from(dy) * i64::from(x);
+                if e >= least && e <= most && first_row <= last_row {
+                    let at = ((x - area.left) >> 4) as usize * stride;
+                    let lane = (x & 15) as usize;
+                    self.step[at + first_row as usize].0[lane] -= 1;
+                    self.step[at + last_row as usize + 1].0[lane] += 1;
+                }
+            }
+            return;
+        }
+        let inverse = 1.0 / f64::from(dx);
+        let mut x = first;
+        while x <= last {
+            // e without its part in y.
+            let rest = (column + f64::from(x)) * f64::from(-dy) + c as f64;
+            let crossing = rest * -inverse;
+            let (from, to) = if dx > 0 {
+                ((rest * -1.0 + least as f64) * inverse, (rest * -1.0 + most as f64) * inverse)
+            } else {
+                ((rest * -1.0 + most as f64) * inverse, (rest * -1.0 + least as f64) * inverse)
+            };
+            // First row below the crossing: inside if the edge is entered there, else outside.
+            let below = if dx > 0 { (crossing - bias).ceil() } else { (crossing + bias).floor() + 1.0 };
+            let (from, to) = ((from - bias).ceil().max(first_f), (to + bias).floor().min(last_f));
+            let below: [u64; 8] = whole(below.max(zero).min(end) + round);
+            let some = from.simd_le(to).to_bitmask();
+            let from: [u64; 8] = whole(from.min(end) + round);
+            let to: [u64; 8] = whole(to.max(zero) + 1.0 + round);
+            for lane in 0..(last - x + 1).min(8) as usize {
+                let at_x = x + lane as i32;
+                let at = ((at_x - area.left) >> 4) as usize * stride;
+                let column = (at_x & 15) as usize;
+                if at_x >= passes[0] && at_x <= passes[1] {
+                    self.step[at + below[lane] as u32 as usize].0[column] += dx.signum();
+                }
+                if some >> lane & 1 == 1 {
+                    self.step[at + from[lane] as u32 as usize].0[column] -= 1;
+                    self.step[at + to[lane] as u32 as usize].0[column] += 1;
+                }
+            }
+            x += 8;
+        }
+    }
+
+    /// Lowers the pixels around each face that is drawn, and notes its edges that belong to the outline. Returns how
+    /// many there are.
+    #[inline(always)]
+    fn lower_depths<S: Simd>(
+        &mut self,
+        simd: S,
+        area: &Area,
+        patch: &FinePatch,
+        placed: &Placed,
+        slack: i32,
+    ) -> u64 {
+        let stride = area.stride();
+        let [left, top, right, bottom] = area.rect;
+        let first = i32x4::from_slice(simd, &[left, top + area.band, 0, 0]);
+        let last = i32x4::from_slice(simd, &[right, bottom + area.band, 0, 0]);
+        let nothing = i32x16::splat(simd, NO_DEPTH);
+        let (turns, corner) = (self.turn.as_slice(), placed.corner.as_slice());
+        self.outline.clear();
+        let mut drawn = 0;
+        for (face, &turn) in patch.face.iter().zip(turns) {
+            if turn == 0 {
+                continue;
+            }
+            drawn += 1;
+            let a = i32x4::from_slice(simd, &corner[usize::from(face.corner[0])]);
+            let b = i32x4::from_slice(simd, &corner[usize::from(face.corner[1])]);
+            let c = i32x4::from_slice(simd, &corner[usize::from(face.corner[2])]);
+            let d = i32x4::from_slice(simd, &corner[usize::from(face.corner[3])]);
+            let (least, most) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+            let depth: [i32; 4] = least.into();
+            let from: [i32; 4] = ((least - (slack + 1)) >> 8).max(first).into();
+            let to: [i32; 4] = ((most + slack) >> 8).min(last).into();
+            let mut ends = 0u32;
+            for k in 0..4 {
+                ends |= u32::from(turns[usize::from(face.across[k])] != turn) << k;
+            }
+            while ends != 0 {
+                let k = ends.trailing_zeros() as usize & 3;
+                ends &= ends - 1;
+                // Of a triangle the edge from corner 2 leads to corner 3, which is corner 0.
+                self.outline.push((face.corner[k], face.corner[k + 1 & 3], turn));
+            }
+            let ([x0, y0, ..], [x1, y1, ..]) = (from, to);
+            if x0 > x1 || y0 > y1 {
+                continue;
+            }
+            let depth = i32x16::splat(simd, depth[2]);
+            for sixteen in x0 >> 4..=x1 >> 4 {
+                let x = sixteen * 16;
+                let columns = (0xFFFFu64 << (x0 - x).max(0)) & (0xFFFF >> (15 - (x1 - x).min(15)));
+                let lower = mask32x16::from_bitmask(simd, columns).select(depth, nothing);
+                let at = ((x - area.left) >> 4) as usize * stride + (y0 - area.band - top) as usize;
+                for row in &mut self.depth[at..=at + (y1 - y0) as usize] {
+                    i32x16::from_slice(simd, &row.0).min(lower).store_slice(&mut row.0);
+                }
+            }
+        }
+        drawn
+    }
+
+    /// Adds up the counts, raises the pixels of the surface that are covered, and leaves all empty.
+    #[inline(always)]
+    fn finish<S: Simd>(&mut self, simd: S, surface: &mut Surface, area: &Area, nearest: f32) {
+        let [_, top, right, bottom] = area.rect;
+        let (zero, one) = (i32x16::splat(simd, 0), i32x16::splat(simd, 1));
+        let nothing = i32x16::splat(simd, NO_DEPTH);
+        let highest = i32x16::splat(simd, nearest.to_bits().cast_signed());
+        for sixteen in area.left >> 4..=right >> 4 {
+            let first = (sixteen - (area.left >> 4)) as usize * area.stride();
+            let mut count = zero;
+            let mut y = top;
+            while y <= bottom {
+                let tile = surface.tile(sixteen, y >> 4);
+                let next = ((y | 15) + 1).min(bottom + 1);
+                let gains = surface.tile_min(tile) < nearest;
+                let mut wrote = false;
+                for row in y..next {
+                    let at = first + (row - top) as usize;
+                    let step = &mut self.step[at].0;
+                    count += i32x16::from_slice(simd, step);
+                    zero.store_slice(step);
+                    let depth = &mut self.depth[at].0;
+                    let covered = count.simd_ge(one);
+                    if gains && covered.any_true() {
+                        if !wrote {
+                            surface.open(simd, tile);
+                            wrote = true;
+                        }
+                        let depth = i32x16::from_slice(simd, depth).min(highest);
+                        surface.raise(simd, tile, row & 15, depth.bitcast(), covered);
+                    }
+                    nothing.store_slice(depth);
+                }
+                if wrote {
+                    surface.raised(tile, nearest);
+                }
+                y = next;
+            }
+            zero.store_slice(&mut self.step[first + area.rows].0);
+        }
+    }
+}
+
+const EIGHT: [f64; 8] = [0., 1., 2., 3., 4., 5., 6., 7.];
+
+/// Whole numbers from sums with [`ROUND`]: in the low 32 bits.
+#[inline(always)]
+fn whole<S: Simd>(v: f64x8<S>) -> [u64; 8] {
+    v.bitcast::<u64x8<S>>().into()
+}
