@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::conventions::Projection;
+use crate::cull::planes::{PlaneCuller, PlanesOptions};
 use crate::index::IndexOptions;
 use crate::reference::trouble;
 use crate::reference::zbuffer;
@@ -70,6 +71,68 @@ fn what_shows_at_a_pixel_centre_is_never_left_out_when_sampled() {
     let index = SceneIndex::build(trouble::scene(1), &IndexOptions::default());
     let moving = CullOptions { meaning: Meaning::Sampled, eye_moves: 0.1, ..CullOptions::default() };
     assert!(cull(&index, &trouble::view(1), &moving).is_err());
+}
+
+#[test]
+fn occluders_that_rest_and_wake_change_nothing_that_shows() {
+    let (mut idle, mut drawn) = (0, 0);
+    for seed in 0..60 {
+        let index = SceneIndex::build(trouble::scene(seed), &IndexOptions::default());
+        let random = &mut trouble::Random::new(seed);
+        let mut view = trouble::view(seed);
+        let mut culler = Culler::new();
+        for frame in 0..24 {
+            let options = CullOptions {
+                coherence: true,
+                least_occluder_px: 0,
+                least_piece_px: 0,
+                reasons: true,
+                ..CullOptions::default()
+            };
+            let found = culler.cull(&index, &view, &options).unwrap();
+            let visible: HashSet<u32> = found.visible.iter().copied().collect();
+            let shown = shown(&index, &view);
+            assert!(
+                shown.is_subset(&visible),
+                "seed {seed}, frame {frame}: {shown:?} show, not all {visible:?}"
+            );
+            every_instance_is_judged_once(&index, &found);
+            idle += found.counters.occluders_idle;
+            drawn += found.counters.occluders;
+            view.view_from_world.translation.x += random.between(-0.1, 0.1);
+            view.view_from_world.translation.z += random.between(-0.1, 0.2);
+        }
+    }
+    assert!(idle > 1000 && drawn > 1000, "{idle} rested, {drawn} were drawn");
+}
+
+#[test]
+fn planes_and_the_buffer_contradict_neither_each_other_nor_the_truth() {
+    let (mut both, mut one) = (0, 0);
+    for seed in 0..300 {
+        let view = trouble::view(seed);
+        if matches!(view.projection, Projection::Orthographic { .. }) {
+            continue;
+        }
+        let scene = trouble::scene(seed);
+        let mut planes = PlaneCuller::new(&scene, &PlanesOptions::default());
+        let polygons = planes.look(&view).unwrap().visible;
+        let by_planes: HashSet<u32> =
+            polygons.iter().map(|&p| planes.model().polygons()[p as usize].instance).collect();
+        let index = SceneIndex::build(scene, &IndexOptions::default());
+        let options = CullOptions { least_occluder_px: 0, least_piece_px: 0, ..CullOptions::default() };
+        let by_buffer: HashSet<u32> = cull(&index, &view, &options).unwrap().visible.into_iter().collect();
+        for instance in shown(&index, &view) {
+            let (planes, buffer) = (by_planes.contains(&instance), by_buffer.contains(&instance));
+            assert!(planes && buffer, "seed {seed}: {instance} shows; planes {planes}, buffer {buffer}");
+        }
+        for instance in 0..index.scene().instance_count() as u32 {
+            let hidden = [&by_planes, &by_buffer].map(|found| !found.contains(&instance));
+            both += u32::from(hidden == [true, true]);
+            one += u32::from(hidden[0] != hidden[1]);
+        }
+    }
+    assert!(both > 100, "{both} instances hidden by both, {one} by one alone");
 }
 
 fn every_instance_is_judged_once(index: &SceneIndex, found: &Culling) {
