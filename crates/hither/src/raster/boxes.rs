@@ -10,6 +10,7 @@
 //! coordinate is off by at most `(eₓ + |q|·e_w) / (W − e_w)` plus 4 roundings of `q`; snapping a corner
 //! moves it by at most 1/512 pixel more. Boxes that may reach the near plane cover the whole window.
 
+use super::box_corners::{axes, corners, largest, smallest};
 use super::pyramid::Rect;
 use super::transform::ScreenFromObject;
 use fearless_simd::{Simd, f32x16, prelude::*};
@@ -73,12 +74,13 @@ pub fn project_boxes<S: Simd>(
     if !set.in_range {
         return everywhere(window);
     }
-    let (x, y) = (corners(simd, &set.x, min, max), corners(simd, &set.y, min, max));
+    let (lo, hi) = (axes(simd, min), axes(simd, max));
+    let (x, y) = (corners(&set.x, &lo, &hi), corners(&set.y, &lo, &hi));
     let (lowest, depth, safe, before_near);
     let mut low = [f32x16::splat(simd, 0.0); 2];
     let mut high = [f32x16::splat(simd, 0.0); 2];
     if set.perspective {
-        let w = corners(simd, &set.w, min, max);
+        let w = corners(&set.w, &lo, &hi);
         lowest = smallest(&w) - set.error[2];
         let highest = largest(&w) + set.error[2];
         let near = f32x16::splat(simd, set.d[3]);
@@ -97,7 +99,7 @@ pub fn project_boxes<S: Simd>(
             }
         }
     } else {
-        let d = corners(simd, &set.d, min, max);
+        let d = corners(&set.d, &lo, &hi);
         let nearest = largest(&d) + set.error[3];
         lowest = f32x16::splat(simd, 1.0);
         safe = nearest.simd_le(f32x16::splat(simd, 1.0));
@@ -127,7 +129,7 @@ pub fn project_boxes<S: Simd>(
     let crossing = !safe & meets;
     let mut alive = meets.to_bitmask() as u16;
     if crossing.any_true() {
-        alive &= !outside_sides(simd, set, &x, &y, min, max, window) | !(crossing.to_bitmask() as u16);
+        alive &= !outside_sides(simd, set, &x, &y, &lo, &hi, window) | !(crossing.to_bitmask() as u16);
     }
     ProjectedBoxes {
         left: store_whole(edges[0]),
@@ -159,11 +161,11 @@ fn outside_sides<S: Simd>(
     set: &BoxSet,
     x: &[f32x16<S>; 8],
     y: &[f32x16<S>; 8],
-    min: &[[f32; 16]; 3],
-    max: &[[f32; 16]; 3],
+    lo: &[f32x16<S>; 3],
+    hi: &[f32x16<S>; 3],
     window: Rect,
 ) -> u16 {
-    let w = if set.perspective { corners(simd, &set.w, min, max) } else { [f32x16::splat(simd, 1.0); 8] };
+    let w = if set.perspective { corners(&set.w, lo, hi) } else { [f32x16::splat(simd, 1.0); 8] };
     let mut outside = 0u16;
     let sides = [(x, set.error[0], window.left, window.right), (y, set.error[1], window.top, window.bottom)];
     for (p, error, first, last) in sides {
@@ -178,40 +180,6 @@ fn outside_sides<S: Simd>(
         }
     }
     outside
-}
-
-/// `row · corner` for the eight corners of sixteen boxes; bit 0 of the corner is x, bit 1 y, bit 2 z.
-#[inline(always)]
-fn corners<S: Simd>(simd: S, row: &[f32; 4], min: &[[f32; 16]; 3], max: &[[f32; 16]; 3]) -> [f32x16<S>; 8] {
-    let x = [term(simd, row, min, 0) + row[3], term(simd, row, max, 0) + row[3]];
-    let y = [term(simd, row, min, 1), term(simd, row, max, 1)];
-    let z = [term(simd, row, min, 2), term(simd, row, max, 2)];
-    let xy = [x[0] + y[0], x[1] + y[0], x[0] + y[1], x[1] + y[1]];
-    [
-        xy[0] + z[0],
-        xy[1] + z[0],
-        xy[2] + z[0],
-        xy[3] + z[0],
-        xy[0] + z[1],
-        xy[1] + z[1],
-        xy[2] + z[1],
-        xy[3] + z[1],
-    ]
-}
-
-#[inline(always)]
-fn term<S: Simd>(simd: S, row: &[f32; 4], from: &[[f32; 16]; 3], axis: usize) -> f32x16<S> {
-    f32x16::from_slice(simd, &from[axis]) * row[axis]
-}
-
-#[inline(always)]
-fn smallest<S: Simd>(v: &[f32x16<S>; 8]) -> f32x16<S> {
-    (v[0].min(v[1])).min(v[2].min(v[3])).min((v[4].min(v[5])).min(v[6].min(v[7])))
-}
-
-#[inline(always)]
-fn largest<S: Simd>(v: &[f32x16<S>; 8]) -> f32x16<S> {
-    (v[0].max(v[1])).max(v[2].max(v[3])).max((v[4].max(v[5])).max(v[6].max(v[7])))
 }
 
 #[inline(always)]

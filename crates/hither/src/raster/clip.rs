@@ -1,11 +1,9 @@
-//! Clipping to the near plane and the guard band, in f64, for the few triangles that need it.
-//!
-//! Cuts are computed from an edge's end points in a fixed order, so that two triangles that share an edge
-//! share its cut point to the last bit and no crack opens between them. The depth plane is the whole
-//! triangle's, not the pieces'.
+//! Clipping to the near plane and the guard band, in f64, for the few triangles that need it. The depth plane is
+//! the whole triangle's, not the pieces'.
 
 use super::Rect;
-use super::setup::{GUARD_MAX, GUARD_MIN, MAX_SLOPE, ScreenTriangle};
+use super::guard::{GUARD_MAX, GUARD_MIN, GuardedPolygon};
+use super::setup::{MAX_SLOPE, ScreenTriangle};
 use super::transform::ScreenFromObject;
 
 /// The visible part of a clipped triangle, as a fan of at most six.
@@ -23,13 +21,6 @@ impl Pieces {
     }
 }
 
-/// Homogeneous screen coordinates (X, Y, W, D) of a polygon of at most 3 + 5 corners.
-#[derive(Clone, Copy)]
-struct Polygon {
-    corner: [[f64; 4]; 8],
-    len: usize,
-}
-
 pub(super) fn clip(corners: &[[f32; 3]; 3], at: &ScreenFromObject, two_sided: bool, window: Rect) -> Pieces {
     let v = corners.map(|c| at.point(c.map(f64::from)));
     if v.iter().flatten().any(|c| !c.is_finite()) {
@@ -42,52 +33,16 @@ pub(super) fn clip(corners: &[[f32; 3]; 3], at: &ScreenFromObject, two_sided: bo
     if volume == 0.0 || !(front || two_sided) {
         return Pieces::NONE;
     }
-    let mut polygon = Polygon { corner: [[0.0; 4]; 8], len: 3 };
-    polygon.corner[..3].copy_from_slice(&v);
-    let (low, high) = (GUARD_MIN * 256.0, GUARD_MAX * 256.0);
-    // Non-negative inside; the near plane first, so that W is positive for the others.
-    let planes: [fn(&[f64; 4], f64) -> f64; 5] = [
-        |p, _| p[2] - p[3],
-        |p, low| p[0] - low * p[2],
-        |p, high| high * p[2] - p[0],
-        |p, low| p[1] - low * p[2],
-        |p, high| high * p[2] - p[1],
-    ];
-    for (plane, bound) in planes.iter().zip([0.0, low, high, low, high]) {
-        polygon = cut(&polygon, |p| plane(p, bound));
-        if polygon.len < 3 {
-            return Pieces { faces_eye: true, ..Pieces::NONE };
-        }
+    match GuardedPolygon::of_triangle(&v, [(); 3], ()) {
+        Some(polygon) => fan(&polygon, &v, volume > 0.0, window),
+        None => Pieces { faces_eye: true, ..Pieces::NONE },
     }
-    fan(&polygon, &v, volume > 0.0, window)
 }
 
-fn cut(polygon: &Polygon, side: impl Fn(&[f64; 4]) -> f64) -> Polygon {
-    let mut out = Polygon { corner: [[0.0; 4]; 8], len: 0 };
-    let mut push = |p: [f64; 4]| {
-        out.corner[out.len] = p;
-        out.len += 1;
-    };
-    for i in 0..polygon.len {
-        let (p, q) = (polygon.corner[i], polygon.corner[(i + 1) % polygon.len]);
-        let (sp, sq) = (side(&p), side(&q));
-        if sp >= 0.0 {
-            push(p);
-        }
-        if (sp >= 0.0) != (sq >= 0.0) {
-            // From the inner end to the outer, whichever way the edge is walked.
-            let (inner, outer, si, so) = if sp >= 0.0 { (p, q, sp, sq) } else { (q, p, sq, sp) };
-            let t = si / (si - so);
-            push(std::array::from_fn(|k| inner[k] + (outer[k] - inner[k]) * t));
-        }
-    }
-    out
-}
-
-fn fan(polygon: &Polygon, v: &[[f64; 4]; 3], positive: bool, window: Rect) -> Pieces {
+fn fan(polygon: &GuardedPolygon<()>, v: &[[f64; 4]; 3], positive: bool, window: Rect) -> Pieces {
     let plane = homogeneous_plane(v);
     let mut screen = [([0i32; 2], 0f32); 8];
-    for (s, p) in screen.iter_mut().zip(&polygon.corner[..polygon.len]) {
+    for (s, (p, ())) in screen.iter_mut().zip(&polygon.corner[..polygon.len]) {
         // Cut points may miss the band by a rounding; snapping must not.
         let snap = |c: f64| (c / p[2]).clamp(GUARD_MIN * 256.0, GUARD_MAX * 256.0).round_ties_even() as i32;
         *s = ([snap(p[0]), snap(p[1])], (p[3] / p[2]).clamp(0.0, 1.0) as f32);

@@ -21,10 +21,12 @@
 //! SIMD goes through `fearless_simd`: one source for AVX-512, AVX2, SSE, NEON and plain code, chosen at
 //! run time, and no `unsafe` here.
 
+mod box_corners;
 mod boxes;
 mod clip;
 mod definitive;
 mod fill;
+mod guard;
 mod hidden;
 mod paint;
 mod pyramid;
@@ -32,8 +34,10 @@ mod setup;
 mod small;
 mod transform;
 
+pub(crate) use box_corners::{axes, corners, largest, smallest};
 pub use boxes::{BoxSet, ProjectedBoxes, project_boxes};
 pub use fill::{Drawing, draw_block};
+pub(crate) use guard::{GUARD_MAX, GUARD_MIN, GuardedPolygon};
 pub use pyramid::{Rect, Target, TargetCounters};
 pub use setup::TriangleBlock;
 pub use transform::ScreenFromObject;

@@ -11,6 +11,7 @@
 //! f64 throughout: a snapped coordinate is then within 2⁻³⁰ pixel of the true one before rounding, at any
 //! scale from 1e-18 to 1e18, and the cost hides behind the divisions.
 
+use super::guard::{GUARD_MAX, GUARD_MIN};
 use super::pyramid::{Rect, Sixteen};
 use super::transform::ScreenFromObject;
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*};
@@ -41,11 +42,6 @@ impl TriangleBlock {
         self.corner.map(|c| c.map(|axis| axis[lane]))
     }
 }
-
-/// The guard band, in pixels: coordinates inside it keep every edge function within 32 bits a tile.
-/// An image (at most 16384 wide) lies inside with at least 8192 pixels to spare on each side.
-pub(super) const GUARD_MIN: f64 = -8192.0;
-pub(super) const GUARD_MAX: f64 = 24576.0;
 
 /// Slopes beyond this belong to triangles seen edge-on; clamping keeps their arithmetic finite.
 pub(super) const MAX_SLOPE: f64 = 1e30;

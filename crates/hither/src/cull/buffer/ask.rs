@@ -7,7 +7,7 @@
 //! `(eₓ + |q|·e_w) / (W − e_w)` plus four roundings of q. Each comparison of a number that is not one fails
 //! on the side of *visible*.
 
-use crate::raster::ScreenFromObject;
+use crate::raster::{ScreenFromObject, axes, corners, largest, smallest};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 
 /// A transform made ready for boxes of its space.
@@ -86,11 +86,11 @@ pub(crate) fn project<S: Simd>(
     let (lo, hi) = (axes(simd, min), axes(simd, max));
     let reach = reach(&lo, &hi);
     let (x_error, y_error) = (error(&reach, &view.x), error(&reach, &view.y));
-    let (x, y) = (corners(simd, &view.x, &lo, &hi), corners(simd, &view.y, &lo, &hi));
+    let (x, y) = (corners(&view.x, &lo, &hi), corners(&view.y, &lo, &hi));
     let (mut low, mut high) = ([f32x16::splat(simd, 0.0); 2], [f32x16::splat(simd, 0.0); 2]);
     let (least_w, w_error, depth, clear, mut inside);
     if view.perspective {
-        let w = corners(simd, &view.w, &lo, &hi);
+        let w = corners(&view.w, &lo, &hi);
         w_error = error(&reach, &view.w);
         least_w = smallest(&w) - w_error;
         let near = f32x16::splat(simd, view.d[3] * 1.000_001);
@@ -108,7 +108,7 @@ pub(crate) fn project<S: Simd>(
             }
         }
     } else {
-        let d = corners(simd, &view.d, &lo, &hi);
+        let d = corners(&view.d, &lo, &hi);
         let d_error = error(&reach, &view.d);
         (least_w, w_error) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
         depth = largest(&d) + d_error;
@@ -164,15 +164,6 @@ pub(crate) fn project<S: Simd>(
     }
 }
 
-#[inline(always)]
-fn axes<S: Simd>(simd: S, sides: &[[f32; 16]; 3]) -> [f32x16<S>; 3] {
-    [
-        f32x16::from_slice(simd, &sides[0]),
-        f32x16::from_slice(simd, &sides[1]),
-        f32x16::from_slice(simd, &sides[2]),
-    ]
-}
-
 /// Largest magnitudes of the coordinates.
 #[inline(always)]
 fn reach<S: Simd>(lo: &[f32x16<S>; 3], hi: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
@@ -214,7 +205,7 @@ fn beyond_a_side<S: Simd>(
         return 0;
     }
     let one = f32x16::splat(simd, 1.0);
-    let w = if view.perspective { corners(simd, &view.w, lo, hi) } else { [one; 8] };
+    let w = if view.perspective { corners(&view.w, lo, hi) } else { [one; 8] };
     let w_error = error(&reach(lo, hi), &view.w);
     let mut beyond = 0u16;
     for (p, own, size) in [(x, errors[0], view.width), (y, errors[1], view.height)] {
@@ -229,35 +220,6 @@ fn beyond_a_side<S: Simd>(
         }
     }
     beyond
-}
-
-/// `row · corner` for the eight corners; bit 0 of the corner is x, bit 1 y, bit 2 z.
-#[inline(always)]
-fn corners<S: Simd>(_simd: S, row: &[f32; 4], lo: &[f32x16<S>; 3], hi: &[f32x16<S>; 3]) -> [f32x16<S>; 8] {
-    let x = [lo[0] * row[0] + row[3], hi[0] * row[0] + row[3]];
-    let y = [lo[1] * row[1], hi[1] * row[1]];
-    let z = [lo[2] * row[2], hi[2] * row[2]];
-    let xy = [x[0] + y[0], x[1] + y[0], x[0] + y[1], x[1] + y[1]];
-    [
-        xy[0] + z[0],
-        xy[1] + z[0],
-        xy[2] + z[0],
-        xy[3] + z[0],
-        xy[0] + z[1],
-        xy[1] + z[1],
-        xy[2] + z[1],
-        xy[3] + z[1],
-    ]
-}
-
-#[inline(always)]
-fn smallest<S: Simd>(v: &[f32x16<S>; 8]) -> f32x16<S> {
-    (v[0].min(v[1])).min(v[2].min(v[3])).min((v[4].min(v[5])).min(v[6].min(v[7])))
-}
-
-#[inline(always)]
-fn largest<S: Simd>(v: &[f32x16<S>; 8]) -> f32x16<S> {
-    (v[0].max(v[1])).max(v[2].max(v[3])).max((v[4].max(v[5])).max(v[6].max(v[7])))
 }
 
 #[inline(always)]

@@ -4,14 +4,8 @@
 //! the cut point to the last bit: cut or not, their edges cancel.
 
 use super::fill::Corner;
-use super::place::{GUARD_MAX, GUARD_MIN, Placing};
-
-/// Homogeneous screen coordinates (X, Y, W, D) of a polygon, and for each corner the edge that follows.
-#[derive(Clone, Copy, Debug)]
-struct Polygon {
-    corner: [([f64; 4], EdgeOf); 8],
-    len: usize,
-}
+use super::place::Placing;
+use crate::raster::{GUARD_MAX, GUARD_MIN, GuardedPolygon};
 
 /// Where a polygon's edge comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,26 +30,8 @@ pub(super) fn clip(v: [[f64; 4]; 3], placing: &Placing) -> Option<Clipped> {
     if v.iter().flatten().any(|c| !c.is_finite()) {
         return None;
     }
-    let empty = ([0.0; 4], EdgeOf::Cut);
-    let mut polygon = Polygon { corner: [empty; 8], len: 3 };
-    for (k, p) in v.into_iter().enumerate() {
-        polygon.corner[k] = (p, EdgeOf::Triangle(k as u8));
-    }
-    let (low, high) = (GUARD_MIN * 256.0, GUARD_MAX * 256.0);
-    // Non-negative inside; the near plane first, so that W is positive for the others.
-    let planes: [fn(&[f64; 4], f64) -> f64; 5] = [
-        |p, _| p[2] - p[3],
-        |p, low| p[0] - low * p[2],
-        |p, high| high * p[2] - p[0],
-        |p, low| p[1] - low * p[2],
-        |p, high| high * p[2] - p[1],
-    ];
-    for (plane, bound) in planes.iter().zip([0.0, low, high, low, high]) {
-        polygon = cut(&polygon, |p| plane(p, bound));
-        if polygon.len < 3 {
-            return None;
-        }
-    }
+    let edges = [EdgeOf::Triangle(0), EdgeOf::Triangle(1), EdgeOf::Triangle(2)];
+    let polygon = GuardedPolygon::of_triangle(&v, edges, EdgeOf::Cut)?;
     let nothing = (Corner { x: 0, y: 0, depth: 0.0 }, EdgeOf::Cut);
     let mut clipped = Clipped { corner: [nothing; 8], len: polygon.len, sign: 0 };
     for (to, (p, edge)) in clipped.corner.iter_mut().zip(&polygon.corner[..polygon.len]) {
@@ -106,29 +82,4 @@ fn sign_of_fan(clipped: &Clipped) -> i32 {
 #[inline(always)]
 pub(super) fn doubled_area(a: &Corner, b: &Corner, c: &Corner) -> i64 {
     i64::from(b.x - a.x) * i64::from(c.y - a.y) - i64::from(c.x - a.x) * i64::from(b.y - a.y)
-}
-
-fn cut(polygon: &Polygon, side: impl Fn(&[f64; 4]) -> f64) -> Polygon {
-    let mut out = Polygon { corner: polygon.corner, len: 0 };
-    let mut push = |p: [f64; 4], edge: EdgeOf| {
-        out.corner[out.len] = (p, edge);
-        out.len += 1;
-    };
-    for i in 0..polygon.len {
-        let ((p, edge), (q, _)) = (polygon.corner[i], polygon.corner[(i + 1) % polygon.len]);
-        let (sp, sq) = (side(&p), side(&q));
-        if sp >= 0.0 {
-            // An edge in the plane itself: what is beyond is gone, whatever it was.
-            push(p, if sp == 0.0 && sq == 0.0 { EdgeOf::Cut } else { edge });
-        }
-        if (sp >= 0.0) != (sq >= 0.0) {
-            // From the inner end to the outer, whichever way the edge is walked.
-            let (inner, outer, si, so) = if sp >= 0.0 { (p, q, sp, sq) } else { (q, p, sq, sp) };
-            let t = si / (si - so);
-            let at = std::array::from_fn(|k| inner[k] + (outer[k] - inner[k]) * t);
-            // Going out, the plane's own edge follows; coming in, the rest of this one.
-            push(at, if sp >= 0.0 { EdgeOf::Cut } else { edge });
-        }
-    }
-    out
 }

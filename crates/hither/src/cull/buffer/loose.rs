@@ -15,10 +15,10 @@
 //! six roundings is at most 2⁻²⁴ of the terms' magnitudes. Each bound is moved inwards by 2⁻²⁰ of them.
 
 use super::occluder::{Face, Patch, Vertices};
-use super::place::{GUARD_MAX, GUARD_MIN, Placing, ROUND, Sizes, dot};
+use super::place::{Placing, ROUND, Sizes, dot};
 use super::surface::{COLUMNS, Surface, TilePlane};
 use crate::index::{Child, Slot, WideTree};
-use crate::raster::ScreenFromObject;
+use crate::raster::{GUARD_MAX, GUARD_MIN, ScreenFromObject};
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*};
 
 /// The loose faces among the children of a node of an occluder's tree.

@@ -2,13 +2,8 @@
 
 use super::fill::Corner;
 use super::occluder::{Patch, Vertices};
-use crate::raster::ScreenFromObject;
+use crate::raster::{GUARD_MAX, ScreenFromObject};
 use fearless_simd::{Simd, f32x16, f64x8, i32x4, i32x16, prelude::*};
-
-/// Coordinates beyond this many pixels from the image's corner are clipped away: edges then fit 64 bits, and
-/// their steps within a tile 32.
-pub(super) const GUARD_MIN: f64 = -8192.0;
-pub(super) const GUARD_MAX: f64 = 24576.0;
 
 /// A patch's vertices on the screen.
 #[derive(Clone, Debug, Default)]

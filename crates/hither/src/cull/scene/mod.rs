@@ -10,9 +10,10 @@
 //! ```
 //!
 //! *Occluders* are chosen by size on the screen: an instance is drawn if its box covers so many pixels, and of
-//! its surface the pieces that are large enough. With coherence each box that is found hidden counts for who was drawn
-//! last in its middle, and an occluder that nothing counted for is not tried again for some frames. Masked and transparent surfaces never hide. Nothing is kept of
-//! where an occluder is, so one that moves or is switched off costs nothing but its place in the index.
+//! its surface the pieces that are large enough. With coherence each box that is found hidden counts for who was
+//! drawn last in its middle, and an occluder of many faces that little counted for is not tried again for some
+//! frames. Masked and transparent surfaces never hide. Nothing is kept of where an occluder is, so one that moves or
+//! is switched off costs nothing but its place in the index.
 //!
 //! The verdicts are those of the conservative buffer: an instance that is left out shows at no point of the
 //! continuous image; or, with [`Meaning::Sampled`], at no pixel's centre.
@@ -47,8 +48,11 @@ pub struct CullOptions {
     /// Boxes of a mesh's own tree that are asked about before an instance counts as visible.
     pub boxes_an_instance: u32,
     /// Start by drawing what hid something in this culler's last frame of the same view number, what hid most
-    /// first; leave out for some frames what was drawn and hid nothing.
+    /// first; leave out for some frames what was drawn and hid too little.
     pub coherence: bool,
+    /// With coherence, an occluder of which more faces than this were drawn for each box that it hid, and for one
+    /// more, is left out for some frames.
+    pub faces_a_hidden_box: u32,
     /// Also say of every instance why it was judged as it was; slower.
     pub reasons: bool,
     /// Instruction set; the best that the machine has by default. Answers do not depend on it.
@@ -66,6 +70,7 @@ impl Default for CullOptions {
             least_px_a_face: 4,
             boxes_an_instance: 256,
             coherence: false,
+            faces_a_hidden_box: 64,
             reasons: false,
             level: Level::new(),
         }
@@ -109,7 +114,7 @@ pub struct CullCounters {
     pub boxes_hidden: u64,
     /// Instances drawn as occluders.
     pub occluders: u64,
-    /// Instances not drawn because they hid nothing lately.
+    /// Instances not drawn because they hid too little lately.
     pub occluders_idle: u64,
     /// Connected pieces of these that were drawn.
     pub occluder_patches: u64,
@@ -145,7 +150,7 @@ struct OneView {
     band: Option<Band>,
     /// Instances drawn as occluders in the last frame, those that hid most first.
     hid: Vec<Hid>,
-    /// Instances that hid nothing when they were last drawn, and for how many frames they are not tried again.
+    /// Instances that hid too little when they were last drawn, and for how many frames they are not tried again.
     idle: HashMap<u32, u32>,
 }
 
@@ -155,9 +160,11 @@ struct Hid {
     instance: u32,
     /// Boxes found hidden, in the middle of which it was drawn last.
     boxes: u32,
+    /// Faces that were drawn.
+    faces: u32,
 }
 
-/// An occluder that hid nothing is left out for so many frames, or up to twice as many, so that not all are tried
+/// An occluder that hid too little is left out for so many frames, or up to twice as many, so that not all are tried
 /// again in the same frame.
 const IDLE_FRAMES: u32 = 8;
 
@@ -251,10 +258,14 @@ impl OneView {
             *frames -= 1;
             *frames > 0
         });
-        let useful = self.hid.partition_point(|h| h.boxes > 0);
-        for idle in self.hid.drain(useful..) {
-            self.idle.insert(idle.instance, IDLE_FRAMES + idle.instance % IDLE_FRAMES);
-        }
+        let idle = &mut self.idle;
+        self.hid.retain(|h| {
+            let pays = h.faces <= (h.boxes + 1).saturating_mul(options.faces_a_hidden_box);
+            if !pays {
+                idle.insert(h.instance, IDLE_FRAMES + h.instance % IDLE_FRAMES);
+            }
+            pays
+        });
         self.band = Some(band);
         culling
     }

@@ -84,6 +84,7 @@ fn occluders_that_rest_and_wake_change_nothing_that_shows() {
         for frame in 0..24 {
             let options = CullOptions {
                 coherence: true,
+                faces_a_hidden_box: 0,
                 least_occluder_px: 0,
                 least_piece_px: 0,
                 reasons: true,

@@ -253,7 +253,7 @@ impl<'a> Walk<'a> {
         let mut drawn = Drawn::default();
         self.band.draw(simd, &standing, &mut drawn);
         if drawn.patches > 0 {
-            self.hid.push(Hid { instance, boxes: 0 });
+            self.hid.push(Hid { instance, boxes: 0, faces: drawn.faces as u32 });
         }
         self.counters.occluders += 1;
         self.counters.occluder_patches += drawn.patches;
