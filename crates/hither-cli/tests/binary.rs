@@ -394,6 +394,10 @@ fn cull_names_what_could_be_seen_and_leaves_out_nothing_that_is() {
     let judged =
         frame["reasons"].as_array().unwrap().iter().map(|r| r["count"].as_u64().unwrap()).sum::<u64>();
     assert_eq!(judged, 27);
+    let sampled = visible(&report("buffer", &["--sampled"])["frames"][0]);
+    assert!(exact.iter().all(|i| sampled.contains(i)) && sampled.iter().all(|i| found.contains(i)));
+    let moving = visible(&report("buffer", &["--margin", "0.1", "--objects-move", "0.1"])["frames"][0]);
+    assert!(found.iter().all(|i| moving.contains(i)), "{found:?} {moving:?}");
     let walk = report("buffer", &["--frames", "0..3", "--coherence", "--camera", "walk", "--margin", "0.1"]);
     assert_eq!(walk["frames"].as_array().unwrap().len(), 3);
 }
@@ -404,6 +408,9 @@ fn cull_refuses_what_it_cannot_do() {
     refused(&["cull", WORLD, "--margin", "-1"], 2, &["--margin", "metres"]);
     refused(&["cull", WORLD, "--margin", "nan"], 2, &["--margin", "metres"]);
     refused(&["cull", WORLD, "--method", "exact", "--margin", "1"], 2, &["--margin", "buffer"]);
+    refused(&["cull", WORLD, "--sampled", "--margin", "1"], 2, &["--sampled", "--margin"]);
+    refused(&["cull", WORLD, "--method", "exact", "--sampled"], 2, &["--sampled", "buffer"]);
+    refused(&["cull", WORLD, "--method", "planes", "--objects-move", "1"], 2, &["--objects-move", "buffer"]);
     refused(&["cull", WORLD, "--method", "exact", "--map", "x.svg"], 2, &["--map", "planes"]);
     refused(&["cull", WORLD, "--method", "planes", "--map", "x.png"], 2, &["x.png", ".svg"]);
     refused(&["cull", WORLD, "--method", "planes", "--occluders", "0"], 2, &["--occluders", "auto"]);

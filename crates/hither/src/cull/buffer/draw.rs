@@ -312,7 +312,7 @@ impl Band {
             }
             let ends = ends_of(face, f, &self.turns);
             let corner = self.placed.corners(&face.corner);
-            if !self.clipped.get(next).is_some_and(|c| c.0 == f as u32) {
+            if self.clipped.get(next).is_none_or(|c| c.0 != f as u32) {
                 let outline = Outline { corner, corners: usize::from(face.corners), turn, ends };
                 fill(simd, surface, joint, &outline, slack, jointly);
                 continue;

@@ -67,8 +67,8 @@ impl FineFaces {
                 sixteen.0.iter_mut().zip(plane).for_each(|(list, v)| list[f % 16] = v);
             }
             let mut across = [f as u16; 4];
-            for k in 0..usize::from(face.corners) {
-                across[k] = if face.across[k] == ENDS { nothing } else { face.across[k] as u16 };
+            for (to, &other) in across.iter_mut().zip(&face.across[..usize::from(face.corners)]) {
+                *to = if other == ENDS { nothing } else { other as u16 };
             }
             self.face.push(FineFace { corner: face.corner.map(|v| v as u16), across });
         }

@@ -156,20 +156,9 @@ pub(super) fn set_up<S: Simd>(
     let (clip_low, least_low) = divide(simd, &mut halves[0], at);
     let (clip_high, least_high) = divide(simd, &mut halves[1], at);
     let clip = (clip_low | clip_high << 8) & faces.lanes;
-    let least_w = if at.perspective {
-        let clean = |clip: u16, w: f64x8<S>| {
-            let mut least = f64::INFINITY;
-            let w: [f64; 8] = w.into();
-            for lane in 0..8 {
-                if clip >> lane & 1 == 0 {
-                    least = least.min(w[lane]);
-                }
-            }
-            least
-        };
-        clean(clip_low, least_low).min(clean(clip_high, least_high)).max(at.d[3])
-    } else {
-        1.0
+    let least_w = match at.perspective {
+        true => least_of(clip | !faces.lanes, least_low, least_high).max(at.d[3]),
+        false => 1.0,
     };
     let mut sorted = Sorted { draw: faces.lanes & !clip, clip };
     if sorted.draw == 0 || !least_w.is_finite() {
@@ -258,6 +247,19 @@ fn divide<S: Simd>(simd: S, half: &mut Eight<S>, at: &ScreenFromObject) -> (u16,
         inside &= (half.y[k].simd_ge(low) & half.y[k].simd_le(high)).to_bitmask();
     }
     (!inside as u16 & 0xFF, least)
+}
+
+/// The least of sixteen numbers, but for those of the lanes that are set apart.
+#[inline(always)]
+fn least_of<S: Simd>(apart: u16, low: f64x8<S>, high: f64x8<S>) -> f64 {
+    let halves: [[f64; 8]; 2] = [low.into(), high.into()];
+    let mut least = f64::INFINITY;
+    for (lane, w) in halves.as_flattened().iter().enumerate() {
+        if apart >> lane & 1 == 0 {
+            least = least.min(*w);
+        }
+    }
+    least
 }
 
 /// Snaps corners to whole numbers and rounds depths away from the eye.
@@ -378,9 +380,9 @@ fn set_planes<S: Simd>(simd: S, h: &Eight<S>, slack: i32, lane: usize, out: &mut
         v.store_slice(&mut list[lane..][..8]);
     }
     let nearest: [f64; 8] = nearest.into();
-    for k in 0..8 {
+    for (to, nearest) in out.nearest[lane..][..8].iter_mut().zip(nearest) {
         // Rounded up: nothing of the face is nearer.
-        out.nearest[lane + k] = (nearest[k] as f32).next_up();
+        *to = (nearest as f32).next_up();
     }
 }
 

@@ -259,7 +259,7 @@ impl Mosaic {
                 let k = ends.trailing_zeros() as usize & 3;
                 ends &= ends - 1;
                 // Of a triangle the edge from corner 2 leads to corner 3, which is corner 0.
-                self.outline.push((face.corner[k], face.corner[k + 1 & 3], turn));
+                self.outline.push((face.corner[k], face.corner[(k + 1) & 3], turn));
             }
             let ([x0, y0, ..], [x1, y1, ..]) = (from, to);
             if x0 > x1 || y0 > y1 {

@@ -296,7 +296,7 @@ impl Surface {
         let columns = f32x16::from_slice(simd, &COLUMNS);
         let depths = plane.rows(simd);
         let (first, last) =
-            (rows.trailing_zeros() as usize & 15, 31 - (rows | 1).leading_zeros() as usize & 15);
+            (rows.trailing_zeros() as usize & 15, (31 - (rows | 1).leading_zeros() as usize) & 15);
         let all = &mut self.rows[tile * 16..][..16];
         let zero = f32x16::splat(simd, 0.0);
         let mut least = f32x16::splat(simd, f32::INFINITY);
@@ -329,7 +329,7 @@ impl Surface {
         let columns = (15u32 << left.max(0)) & (15 >> (3 - right.min(3)));
         let rows = (0xFFFFu32 << (top.max(0) * 4)) & (0xFFFF >> ((3 - bottom.min(3)) * 4));
         let farther = f32x16::from_slice(simd, &self.min[cell].0).simd_lt(depth).to_bitmask() as u32;
-        farther & (columns & 15) * 0x1111 & rows
+        farther & ((columns & 15) * 0x1111) & rows
     }
 
     /// Says that pixels of an open tile were raised, none above `highest`.
