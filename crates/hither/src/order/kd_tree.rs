@@ -2,9 +2,10 @@
 //!
 //! A node halves its members along one of the directions; who lies on both sides is in both halves. Which direction
 //! is settled when the tree is built, by the least cost (the longer half plus what is shared); where, anew each
-//! frame, from a list of the members' ends that stays sorted by insertion. A tree that has grown by half over what
-//! it was when it was built is built anew. (The paper does that in the background over many frames; here it is
-//! done at once, for the frame that does it costs what its first one did.)
+//! frame, from a list of the members' ends that stays sorted by insertion. A tree whose leaves cost
+//! half as much again as when it was built is built anew in the background, from the extents of the frame in which that was seen; the
+//! old one serves meanwhile. The new one takes over a fixed number of frames later, ready or not, so that the order
+//! does not depend on how fast a thread was.
 //!
 //! Angles are periodic: an interval across the branch cut goes to both halves wherever angles are halved, and
 //! intervals are compared on the circle at the leaves.
@@ -14,13 +15,16 @@
 use super::extents::{CUT, Direction, Interval, TURN};
 use crate::geometry::Hull;
 use glam::{DAffine3, DVec3};
+use std::thread::JoinHandle;
 
 /// A node with fewer members is a leaf.
 const LEAST_HALVED: usize = 10;
 /// Halving must take at least this many members off the longer half.
 const LEAST_GAIN: usize = 4;
-/// A tree is built anew when its leaves hold this much more than when it was built.
+/// A tree is built anew when its burden is so many times what it was when it was built.
 const GROWTH: f64 = 1.5;
+/// Frames for which a tree is built in the background.
+const FRAMES_TO_BUILD: u32 = 8;
 /// The directions that are measured unless others are set: two angles about axes at right angles, and the depth at
 /// right angles to both, as in [Snyder & Lengyel 1997, §5.1], but the world's instead of the camera's.
 const USUAL: [Direction; 3] = [
@@ -61,113 +65,61 @@ struct Node {
     active: u32,
 }
 
+/// What pieces measure along each direction.
+#[derive(Clone, Debug)]
+struct Extents {
+    directions: Vec<Direction>,
+    /// For each piece one for each direction.
+    intervals: Vec<Interval>,
+}
+
+/// A tree that is built in the background.
+#[derive(Debug)]
+struct Building {
+    tree: JoinHandle<Vec<Node>>,
+    /// It takes over when this is 0.
+    frames: u32,
+}
+
 /// The tree, and the extents it is over.
 #[derive(Debug)]
 pub(super) struct KdTree {
-    directions: Vec<Direction>,
+    extents: Extents,
     nodes: Vec<Node>,
-    /// For each piece one for each direction.
-    extents: Vec<Interval>,
+    building: Option<Building>,
     summits: Vec<[u32; 2]>,
     present: Vec<bool>,
     /// Who has been found by the query that is under way, and who is a member of the node that is worked on.
     marks: Vec<u32>,
     mark: u32,
-    /// Entries of all leaves when it was built.
-    built_entries: usize,
+    /// Its burden when it was built.
+    built_burden: usize,
     /// How often it was built.
     pub(super) builds: u64,
 }
 
-impl Default for KdTree {
-    fn default() -> Self {
-        KdTree {
-            directions: USUAL.to_vec(),
-            nodes: Vec::new(),
-            extents: Vec::new(),
-            summits: Vec::new(),
-            present: Vec::new(),
-            marks: Vec::new(),
-            mark: 0,
-            built_entries: 0,
-            builds: 0,
-        }
-    }
-}
-
-impl KdTree {
-    /// Measures along these directions from now on. As many as before, and near them: the tree stays.
-    pub(super) fn set_directions(&mut self, directions: &[Direction]) {
-        let kind = |d: &Direction| matches!(d, Direction::Angular { .. });
-        if !directions.iter().map(kind).eq(self.directions.iter().map(kind)) {
-            self.nodes.clear();
-            self.extents.clear();
-            self.summits.clear();
-        }
-        self.directions = directions.to_vec();
-    }
-
+impl Extents {
     fn is_angle(&self, direction: usize) -> bool {
         matches!(self.directions[direction], Direction::Angular { .. })
     }
 
-    fn extents_of(&self, piece: u32) -> &[Interval] {
+    fn of(&self, piece: u32) -> &[Interval] {
         let k = self.directions.len();
-        &self.extents[piece as usize * k..(piece as usize + 1) * k]
-    }
-
-    /// Forgets who is there; `pieces` is how many there are.
-    pub(super) fn clear(&mut self, pieces: usize) {
-        self.extents.resize(pieces * self.directions.len(), Interval::default());
-        self.summits.resize(pieces * self.directions.len(), [0; 2]);
-        self.marks.resize(pieces, 0);
-        self.present.clear();
-        self.present.resize(pieces, false);
-    }
-
-    /// Measures a piece, whose pose is relative to the eye.
-    pub(super) fn add(&mut self, piece: u32, hull: &Hull, pose: &DAffine3) {
-        self.present[piece as usize] = true;
-        let first = piece as usize * self.directions.len();
-        for (at, direction) in (first..).zip(&self.directions) {
-            self.extents[at] = direction.extent(hull, pose, &mut self.summits[at]);
-        }
-    }
-
-    /// Brings the tree up to date with what was measured.
-    pub(super) fn update(&mut self) {
-        let members: Vec<u32> =
-            (0..self.present.len() as u32).filter(|&p| self.present[p as usize]).collect();
-        if !self.nodes.is_empty() {
-            self.rebalance(0, &members);
-        }
-        if self.nodes.is_empty() || self.entries(0) as f64 > GROWTH * self.built_entries.max(16) as f64 {
-            self.nodes.clear();
-            self.grow(&members, usize::MAX);
-            self.built_entries = self.entries(0);
-            self.builds += 1;
-        }
-    }
-
-    fn entries(&self, node: u32) -> usize {
-        match &self.nodes[node as usize].kind {
-            Kind::Leaf(members) => members.len(),
-            Kind::Halved { children, .. } => children.iter().map(|&c| self.entries(c)).sum(),
-        }
+        &self.intervals[piece as usize * k..(piece as usize + 1) * k]
     }
 
     /// The interval that decides in which half a member is.
     fn span(&self, member: u32, direction: usize) -> Interval {
-        let interval = self.extents_of(member)[direction];
+        let interval = self.of(member)[direction];
         let across_cut = self.is_angle(direction) && interval.high >= CUT + TURN;
         if across_cut { Interval { low: CUT - 1.0, high: CUT + TURN + 1.0 } } else { interval }
     }
 
-    /// Builds the tree over `members`; `before` is how many the parent had.
-    fn grow(&mut self, members: &[u32], before: usize) -> u32 {
-        let number = self.nodes.len() as u32;
+    /// Builds the tree over `members` at the end of `nodes`; `before` is how many the parent had.
+    fn grow(&self, nodes: &mut Vec<Node>, members: &[u32], before: usize) -> u32 {
+        let number = nodes.len() as u32;
         let active = members.len() as u32;
-        self.nodes.push(Node { kind: Kind::Leaf(members.to_vec()), active });
+        nodes.push(Node { kind: Kind::Leaf(members.to_vec()), active });
         if members.len() < LEAST_HALVED || before.saturating_sub(members.len()) < LEAST_GAIN {
             return number;
         }
@@ -185,8 +137,8 @@ impl KdTree {
         if halves.iter().any(|h| members.len() - h.len().min(members.len()) < LEAST_GAIN) {
             return number;
         }
-        let children = halves.map(|half| self.grow(&half, members.len()));
-        self.nodes[number as usize].kind = Kind::Halved { direction, at, bounds, children };
+        let children = halves.map(|half| self.grow(nodes, &half, members.len()));
+        nodes[number as usize].kind = Kind::Halved { direction, at, bounds, children };
         number
     }
 
@@ -205,6 +157,104 @@ impl KdTree {
         let above = members.iter().copied().filter(|m| span(m).high > at).collect();
         [below, above]
     }
+}
+
+impl Default for KdTree {
+    fn default() -> Self {
+        KdTree {
+            extents: Extents { directions: USUAL.to_vec(), intervals: Vec::new() },
+            nodes: Vec::new(),
+            building: None,
+            summits: Vec::new(),
+            present: Vec::new(),
+            marks: Vec::new(),
+            mark: 0,
+            built_burden: 0,
+            builds: 0,
+        }
+    }
+}
+
+impl KdTree {
+    /// Measures along these directions from now on. As many as before, and near them: the tree stays.
+    pub(super) fn set_directions(&mut self, directions: &[Direction]) {
+        let kind = |d: &Direction| matches!(d, Direction::Angular { .. });
+        if !directions.iter().map(kind).eq(self.extents.directions.iter().map(kind)) {
+            self.nodes.clear();
+            self.building = None;
+            self.extents.intervals.clear();
+            self.summits.clear();
+        }
+        self.extents.directions = directions.to_vec();
+    }
+
+    /// Forgets who is there; `pieces` is how many there are.
+    pub(super) fn clear(&mut self, pieces: usize) {
+        let ends = pieces * self.extents.directions.len();
+        self.extents.intervals.resize(ends, Interval::default());
+        self.summits.resize(ends, [0; 2]);
+        self.marks.resize(pieces, 0);
+        self.present.clear();
+        self.present.resize(pieces, false);
+    }
+
+    /// Measures a piece, whose pose is relative to the eye.
+    pub(super) fn add(&mut self, piece: u32, hull: &Hull, pose: &DAffine3) {
+        self.present[piece as usize] = true;
+        let Extents { directions, intervals } = &mut self.extents;
+        let first = piece as usize * directions.len();
+        for (at, direction) in (first..).zip(directions) {
+            intervals[at] = direction.extent(hull, pose, &mut self.summits[at]);
+        }
+    }
+
+    /// Brings the tree up to date with what was measured.
+    pub(super) fn update(&mut self) {
+        let members: Vec<u32> =
+            (0..self.present.len() as u32).filter(|&p| self.present[p as usize]).collect();
+        let due = |building: &mut Building| {
+            building.frames = building.frames.saturating_sub(1);
+            building.frames == 0
+        };
+        if let Some(building) = self.building.take_if(due) {
+            // A thread that failed leaves no tree: it is built at once.
+            self.nodes = building.tree.join().unwrap_or_default();
+            self.count_build();
+        }
+        if self.nodes.is_empty() {
+            self.building = None;
+            self.extents.grow(&mut self.nodes, &members, usize::MAX);
+            self.count_build();
+            return;
+        }
+        self.rebalance(0, &members);
+        let is_worse = self.burden(0) as f64 > GROWTH * self.built_burden.max(256) as f64;
+        if is_worse && self.building.is_none() {
+            let extents = self.extents.clone();
+            let build = move || {
+                let mut nodes = Vec::new();
+                extents.grow(&mut nodes, &members, usize::MAX);
+                nodes
+            };
+            let tree = std::thread::Builder::new().name("kd-tree".into()).spawn(build);
+            // Without a thread there is no better tree; it is tried again in the next frame.
+            self.building = tree.ok().map(|tree| Building { tree, frames: FRAMES_TO_BUILD });
+        }
+    }
+
+    fn count_build(&mut self) {
+        self.built_burden = self.burden(0);
+        self.builds += 1;
+    }
+
+    /// What queries cost: the square of the members, over all leaves. It grows where members are in several leaves, and
+    /// where a leaf has come to hold many.
+    fn burden(&self, node: u32) -> usize {
+        match &self.nodes[node as usize].kind {
+            Kind::Leaf(members) => members.len() * members.len(),
+            Kind::Halved { children, .. } => children.iter().map(|&c| self.burden(c)).sum(),
+        }
+    }
 
     /// Makes `members` those of the node and, where it is halved, halves them anew along the same direction.
     fn rebalance(&mut self, node: u32, members: &[u32]) {
@@ -221,19 +271,19 @@ impl KdTree {
         members.iter().for_each(|&m| self.marks[m as usize] = wanted);
         bounds.retain(|b| self.marks[b.member as usize] >= wanted);
         for bound in &mut bounds {
-            let span = self.span(bound.member, direction);
+            let span = self.extents.span(bound.member, direction);
             bound.at = if bound.upper { span.high } else { span.low };
         }
         bounds.iter().for_each(|b| self.marks[b.member as usize] = had);
         insertion_sort(&mut bounds);
         let new: Vec<u32> = members.iter().copied().filter(|&m| self.marks[m as usize] == wanted).collect();
         if !new.is_empty() {
-            bounds.extend(self.bounds(&new, direction));
+            bounds.extend(self.extents.bounds(&new, direction));
             // Two sorted runs, one of them after sorting: a merge.
             bounds.sort_by(|a, b| a.key().0.total_cmp(&b.key().0).then(a.key().1.cmp(&b.key().1)));
         }
         let (_, place) = least_cost(&bounds);
-        let halves = self.halves(members, direction, place);
+        let halves = self.extents.halves(members, direction, place);
         for (child, half) in children.into_iter().zip(&halves) {
             self.rebalance(child, half);
         }
@@ -247,7 +297,7 @@ impl KdTree {
             let node = &mut self.nodes[node as usize];
             node.active -= 1;
             if let Kind::Halved { direction, at, children, .. } = node.kind {
-                let span = self.span(piece, direction);
+                let span = self.extents.span(piece, direction);
                 work.extend((span.low <= at).then_some(children[0]));
                 work.extend((span.high > at).then_some(children[1]));
             }
@@ -255,19 +305,20 @@ impl KdTree {
     }
 
     fn allowed(&self, front: u32, query: &[Interval]) -> bool {
-        let meet = |(d, (front, query)): (usize, (&Interval, &Interval))| match self.is_angle(d) {
+        let meet = |(d, (front, query)): (usize, (&Interval, &Interval))| match self.extents.is_angle(d) {
             true => front.meets_around(query),
             false => front.meets(query),
         };
-        self.extents_of(front).iter().zip(query).enumerate().all(meet)
+        self.extents.of(front).iter().zip(query).enumerate().all(meet)
     }
 
     /// Calls `found` with every piece that is not out and whose extents allow that it occludes `piece`.
     pub(super) fn occluders(&mut self, piece: u32, alive: &[bool], mut found: impl FnMut(u32)) {
         // The eye is the origin: along the line, from it to the piece.
-        let reach =
-            |(d, interval): (usize, &Interval)| if self.is_angle(d) { *interval } else { interval.with(0.0) };
-        let query: Vec<Interval> = self.extents_of(piece).iter().enumerate().map(reach).collect();
+        let reach = |(d, interval): (usize, &Interval)| {
+            if self.extents.is_angle(d) { *interval } else { interval.with(0.0) }
+        };
+        let query: Vec<Interval> = self.extents.of(piece).iter().enumerate().map(reach).collect();
         self.mark = self.mark.wrapping_add(2);
         let mut work = vec![0];
         while let Some(node) = work.pop() {
@@ -278,7 +329,7 @@ impl KdTree {
             match &node.kind {
                 Kind::Halved { direction, at, children, .. } => {
                     let interval = query[*direction];
-                    let across = self.is_angle(*direction) && interval.high >= CUT + TURN;
+                    let across = self.extents.is_angle(*direction) && interval.high >= CUT + TURN;
                     work.extend((across || interval.low <= *at).then_some(children[0]));
                     work.extend((across || interval.high > *at).then_some(children[1]));
                 }

@@ -317,3 +317,34 @@ fn a_known_plane_parts_neighbours_that_overlap() {
     let groups: Vec<Vec<u32>> = sort.sort(-eye).groups().map(<[u32]>::to_vec).collect();
     assert_eq!(groups, [[0], [1]]);
 }
+
+/// Parts that leave their places make the tree worse and worse: it is built anew in the background, and every order on
+/// the way is the same whenever the thread is done.
+#[test]
+fn a_tree_built_in_the_background_changes_no_order() {
+    let run = |pause: bool| {
+        let mut random = Random(5);
+        let options = SortOptions { broad_phase: BroadPhase::KdTree, ..SortOptions::default() };
+        let mut stage = Stage::new(options);
+        stage.sort.set_directions(&[Direction::Spatial(DVec3::X), Direction::Spatial(DVec3::Z)]);
+        (0..80).for_each(|_| stage.add(&mut random, 1.0));
+        let mut orders = Vec::new();
+        for frame in 0..60 {
+            // From side by side to one behind the other.
+            let turn = DQuat::from_rotation_y(f64::from(frame.min(40)) * 0.039);
+            for (poses, i) in stage.poses.iter_mut().zip(0..) {
+                let place = turn * DVec3::new(f64::from(i) * 2.0, 0.0, -1.0) + DVec3::NEG_Z * 5.0;
+                poses.iter_mut().for_each(|p| p.translation = place);
+            }
+            stage.place();
+            orders.push(stage.sort.sort(DVec3::new(0.0, 0.0, 3.0)).clone());
+            if pause && frame % 7 == 0 {
+                std::thread::sleep(std::time::Duration::from_millis(5));
+            }
+        }
+        (orders, stage.sort.tree_builds())
+    };
+    let (orders, builds) = run(false);
+    assert!(builds > 1, "{builds}");
+    assert!(run(true) == (orders, builds));
+}
