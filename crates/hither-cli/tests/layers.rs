@@ -142,3 +142,60 @@ fn layers_are_left_out_replaced_blurred_and_reused() {
     let refused = hither(&["layers", WORLD, "-o", &folder.path("x.ora"), "--focus", "0"]);
     assert_eq!(refused.status.code(), Some(2));
 }
+
+#[test]
+fn parts_that_pass_through_each_other_are_merged_or_held_out() {
+    let layers = |options: &[&str]| {
+        let usual = ["layers", WORLD, "--size", "640x360", "--verify", "--json", "-", "-q"];
+        let json = report(&[&usual[..], options].concat());
+        let frame = &json["frames"][0];
+        assert_eq!(frame["verification"]["pixels_differing"], 0, "{options:?}");
+        let layers = frame["layers"].as_array().unwrap();
+        let held_out = layers.iter().filter(|l| l["held_out_samples"].as_u64().unwrap() > 0).count();
+        (layers.len(), held_out)
+    };
+    let (hulls, samples, held_out) = (layers(&["--occlusion", "hulls"]), layers(&[]), layers(&["--holdout"]));
+    assert!(hulls.0 <= samples.0 && samples.0 < held_out.0, "{hulls:?} {samples:?} {held_out:?}");
+    assert!(held_out.0 == 50 && hulls.1 == 0 && samples.1 == 0 && held_out.1 > 0);
+    let refused = hither(&["layers", WORLD, "--json", "-", "--holdout", "--occlusion", "hulls"]);
+    assert_eq!(refused.status.code(), Some(2));
+}
+
+#[test]
+fn a_node_is_split_into_parts() {
+    const VALLEY: &str = "world:canyon?grid=1";
+    let parts = |options: &[&str]| {
+        let json = report(&[&["order", VALLEY, "--json", "-", "-q"][..], options].concat());
+        json["parts"].as_array().unwrap().len()
+    };
+    assert_eq!(parts(&[]), 38);
+    assert_eq!(parts(&["--split", "terrain 0=grid:5x5"]), 37 + 25);
+    // Pieces stay apart whatever is one part otherwise.
+    assert_eq!(parts(&["--split", "terrain 0=grid:5x5", "--parts", "depth=1"]), 7 + 25);
+    assert!(parts(&["--split", "terrain 0=adaptive:9", "--split", "body 0=boxes:2x1x1"]) >= 36 + 9 + 2);
+    let json = report(&[
+        "layers",
+        VALLEY,
+        "--split",
+        "terrain 0=grid:6x6",
+        "--overlap",
+        "10",
+        "--shade",
+        "flat",
+        "--size",
+        "160x90",
+        "--verify",
+        "--json",
+        "-",
+        "-q",
+    ]);
+    let off = json["frames"][0]["verification"]["largest_difference"].as_f64().unwrap();
+    assert!(off < 1.0 / 255.0, "{off}");
+    for (split, code) in
+        [("terrain 0=grid:5", 2), ("terrain 0", 2), ("terrain 0=grid:0x1", 2), ("sea=grid:2x2", 1)]
+    {
+        let refused = hither(&["order", VALLEY, "--split", split]);
+        assert_eq!(refused.status.code(), Some(code), "{split}");
+    }
+    assert_eq!(hither(&["order", VALLEY, "--overlap", "5"]).status.code(), Some(2));
+}

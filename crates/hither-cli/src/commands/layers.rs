@@ -5,7 +5,7 @@ mod reuse;
 mod write;
 
 use super::report;
-use super::sorting::{PartOptions, Sorting};
+use super::sorting::{LayerOptions, PartOptions, Sorting};
 use crate::console::Verbosity;
 use crate::eye::Eye;
 use crate::failure::Failure;
@@ -17,9 +17,7 @@ use crate::timeline::Timeline;
 use focus::FocusOptions;
 use hither::Scene;
 use hither::conventions::View;
-use hither::layers::{
-    Canvas, Component, Expression, LayerPainter, PaintOptions, Painted, Program, Sprite, decompose,
-};
+use hither::layers::{Canvas, Component, Expression, LayerPainter, PaintOptions, Painted, Program, Sprite};
 use hither::order::SortOptions;
 use hither::render::RenderOptions;
 use reuse::Reuse;
@@ -37,6 +35,8 @@ pub struct Arguments {
     output: Option<PathBuf>,
     #[command(flatten)]
     parts: PartOptions,
+    #[command(flatten)]
+    layers: LayerOptions,
     /// How the layers are coloured
     #[arg(long, value_name = "NAME", default_value = "smooth")]
     shade: ShadeName,
@@ -87,6 +87,8 @@ struct Layer {
     painted: Painted,
     /// Left out of the composite.
     out: bool,
+    /// Samples that are cut because another layer is before them.
+    held_out: u64,
 }
 
 /// Takes the frames apart that are asked for.
@@ -94,8 +96,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let verbosity = arguments.report.verbosity();
     let to = arguments.report.json.as_deref();
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
+    arguments.layers.check()?;
     check_outputs(arguments)?;
     let mut scene = source::open(&arguments.scene, verbosity)?;
+    let prepared = arguments.parts.prepare(&mut scene, &arguments.scene)?;
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     timeline.pose_scene(&mut scene, timeline.frames.start);
     let eye = Eye::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
@@ -103,7 +107,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // Corners are rounded to 1/256 pixel, and depth to single precision.
     let slack = 1.0 / (256.0 * view.pixels_per_unit()) + 1e-6;
     let options = SortOptions { slack, ..SortOptions::default() };
-    let mut sorting = Sorting::new(&scene, &arguments.scene, &arguments.parts, options, verbosity)?;
+    let mut sorting =
+        Sorting::new(&scene, &arguments.scene, &arguments.parts, &prepared, options, verbosity)?;
     let replacements = replacements(arguments, &sorting)?;
     let mut painter = LayerPainter::new(&scene);
     let paint = PaintOptions {
@@ -198,20 +203,18 @@ fn take_apart(
     replacements: &[(String, Option<Sprite>)],
 ) -> Result<Taken, Failure> {
     sorting.sort(scene, view);
-    let order = sorting.sort.order().clone();
-    let mut components = decompose(&order, |group| sorting.sort.arcs_among(group));
+    let (mut components, held_out) = sorting.components(&arguments.layers, painter, view, paint)?;
     let bar =
         arguments.report.verbosity().bar(components.iter().map(|c| c.layers.len() as u64).sum(), "layers");
     let mut layers = Vec::new();
     for component in &mut components {
         let mut kept = Vec::new();
         for (at, parts) in component.layers.iter().enumerate() {
-            let instances =
-                parts.iter().flat_map(|&p| sorting.parts.parts[p as usize].instances.iter().copied());
-            let mut instances: Vec<u32> = instances.collect();
-            instances.sort_unstable();
-            let mut painted =
-                painter.paint(&instances, view, paint).map_err(|e| Failure::work(e.to_string()))?;
+            let instances = sorting.instances_of(parts);
+            let holdout = parts.iter().find_map(|part| held_out.get(part));
+            let mut painted = painter
+                .paint_held_out(&instances, view, paint, holdout)
+                .map_err(|e| Failure::work(e.to_string()))?;
             bar.inc(1);
             let name = parts.iter().map(|&p| sorting.name(p)).collect::<Vec<_>>().join(" + ");
             let replacement = replacements.iter().find(|(n, _)| parts.iter().any(|&p| sorting.name(p) == *n));
@@ -228,7 +231,8 @@ fn take_apart(
                 continue;
             }
             kept.push(at as u32);
-            layers.push(Layer { name, parts: parts.clone(), painted, out });
+            let held_out = holdout.map_or(0, |h| h.samples());
+            layers.push(Layer { name, parts: parts.clone(), painted, out, held_out });
         }
         keep(component, &kept);
     }
@@ -266,17 +270,28 @@ fn quoted(name: &str) -> String {
 fn say(verbosity: Verbosity, taken: &Taken, output: Option<&Path>, numbered: bool) {
     let several = taken.layers.iter().filter(|l| l.parts.len() > 1).count();
     let cycles = taken.components.iter().filter(|c| c.layers.len() > 1).count();
-    let line = format!(
+    let held_out = taken.layers.iter().filter(|l| l.held_out > 0).count();
+    let mut line = format!(
         "{}, {} of several parts, {} composited without merging, {}",
         count(taken.layers.len() as u64, "layer"),
         several,
         count(cycles as u64, "cycle"),
         count(taken.program.instructions.len() as u64, "instruction"),
     );
+    if held_out > 0 {
+        line.push_str(&format!("; {held_out} cut where others are before them"));
+    }
     let wrote = output.map(|o| format!("wrote {}: ", o.display())).unwrap_or_default();
     match numbered {
         true => verbosity.detail(&format!("{wrote}{line}")),
         false => verbosity.note(&format!("{wrote}{line}")),
+    }
+    let parts: usize = taken.layers.iter().map(|l| l.parts.len()).sum();
+    let largest = taken.layers.iter().map(|l| l.parts.len()).max().unwrap_or(0);
+    if !numbered && largest > 1 && largest * 2 > parts {
+        verbosity.note(&format!(
+            "one layer holds {largest} of {parts} parts, which occlude each other both ways; --holdout keeps them apart"
+        ));
     }
 }
 
@@ -347,6 +362,7 @@ fn frame_json(
             "parts": layer.parts,
             "file": files.get(index),
             "left_out": layer.out,
+            "held_out_samples": layer.held_out,
             "rectangle": [sprite.x, sprite.y, sprite.width, sprite.height],
         })
     };

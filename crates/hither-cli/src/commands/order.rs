@@ -51,13 +51,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let start = Instant::now();
     let mut scene = source::open(&arguments.scene, verbosity)?;
+    let prepared = arguments.parts.prepare(&mut scene, &arguments.scene)?;
     let read_time = start.elapsed();
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     timeline.pose_scene(&mut scene, timeline.frames.start);
     let eye = Eye::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     let start = Instant::now();
     let options = SortOptions { incremental: !arguments.from_scratch, ..SortOptions::default() };
-    let mut sorting = Sorting::new(&scene, &arguments.scene, &arguments.parts, options, verbosity)?;
+    let mut sorting =
+        Sorting::new(&scene, &arguments.scene, &arguments.parts, &prepared, options, verbosity)?;
     let hull_time = start.elapsed();
     verbosity.detail(&format!("read in {}, hulls in {}", in_ms(read_time), in_ms(hull_time)));
 

@@ -110,6 +110,19 @@ impl SceneIndex {
         self.update(&[node])
     }
 
+    /// Moves several nodes of the root group at once. Cost: as of [`SceneIndex::pose`], once instead of a node.
+    pub fn set_transforms(&mut self, moves: impl IntoIterator<Item = (u32, Transform)>) -> usize {
+        let nodes = &mut self.scene.groups[self.scene.root as usize].nodes;
+        let place = |(node, local): (u32, Transform)| {
+            nodes[node as usize].local = local;
+            node
+        };
+        let mut changed: Vec<u32> = moves.into_iter().map(place).collect();
+        changed.sort_unstable();
+        changed.dedup();
+        self.update(&changed)
+    }
+
     /// Follows the nodes in `changed` (ascending) and below.
     fn update(&mut self, changed: &[u32]) -> usize {
         let root = self.scene.root as usize;

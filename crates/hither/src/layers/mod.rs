@@ -6,6 +6,7 @@
 //! still occlude each other in cycles, and an [`Expression`] of Porter and Duff's operators on their images is the
 //! component's picture all the same. [`Program`] is its form for a machine with three image registers.
 //!
+//! [`LayerPainter::look`] looks closer at a cycle: at the samples of a picture much of it falls apart.
 //! [`LayerPainter`] draws layers with [`render`](mod@crate::render); [`depth_of_field`](mod@depth_of_field) blurs each
 //! by its own circle of confusion, and [`reuse`](mod@reuse) warps what was drawn before instead of drawing it again.
 //!
@@ -19,12 +20,14 @@ mod paint;
 mod plan;
 mod program;
 pub mod reuse;
+mod sight;
 mod sprite;
 #[cfg(test)]
 mod tests;
 
-pub use components::{Component, decompose};
+pub use components::{Component, Mutual, decompose, decompose_by_sight};
 pub use expression::{Expression, sum_of_outs};
 pub use paint::{LayerPainter, PaintOptions, Painted};
 pub use program::{Instruction, Operation, Program, Register, Source};
+pub use sight::{Holdout, Sight};
 pub use sprite::{Canvas, Sprite};

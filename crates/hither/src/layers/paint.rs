@@ -5,6 +5,7 @@
 //! numbers, ties in depth are decided as in the whole picture, and a layer's pixels are the whole picture's to
 //! the last bit wherever it is in front.
 
+use super::sight::Holdout;
 use super::sprite::Sprite;
 use crate::conventions::{View, ViewError};
 use crate::index::{IndexOptions, SceneIndex};
@@ -29,6 +30,14 @@ impl Default for PaintOptions {
     }
 }
 
+impl PaintOptions {
+    /// The view with every sample a pixel.
+    pub(super) fn fine(&self, view: &View) -> View {
+        let samples = self.samples.max(1);
+        View { width: view.width * samples, height: view.height * samples, ..*view }
+    }
+}
+
 /// A layer's picture.
 #[derive(Clone, Debug, Default)]
 pub struct Painted {
@@ -42,10 +51,10 @@ pub struct Painted {
 /// Draws some of a scene's instances at a time.
 #[derive(Debug)]
 pub struct LayerPainter {
-    index: SceneIndex,
-    renderer: Renderer,
+    pub(super) index: SceneIndex,
+    pub(super) renderer: Renderer,
     shader: Shader,
-    poses: Vec<DAffine3>,
+    pub(super) poses: Vec<DAffine3>,
     shown: Vec<u32>,
 }
 
@@ -71,7 +80,10 @@ impl LayerPainter {
             textures: scene.textures.clone(),
         };
         let shader = Shader::new(&flat, 0);
-        let index = SceneIndex::build(flat, &IndexOptions::default());
+        let mut index = SceneIndex::build(flat, &IndexOptions::default());
+        // Everything moves from the start: otherwise its tree would be made anew with each thing that joins.
+        let nowhere = DAffine3 { matrix3: DMat3::ZERO, ..DAffine3::from_translation(glam::DVec3::ONE) };
+        index.set_transforms((0..poses.len() as u32).map(|i| (i, Transform::Affine(nowhere))));
         LayerPainter { index, renderer: Renderer::new(), shader, poses, shown: Vec::new() }
     }
 
@@ -80,25 +92,36 @@ impl LayerPainter {
         self.poses = scene.instances().iter().map(|i| i.world_from_mesh).collect();
     }
 
-    /// Draws `instances` alone. Memory while it works: some hundred bytes a sample.
+    /// Draws `instances` alone.
     pub fn paint(
         &mut self,
         instances: &[u32],
         view: &View,
         options: &PaintOptions,
     ) -> Result<Painted, ViewError> {
-        let gone = hidden(&view.view_from_world.inverse());
-        for instance in std::mem::take(&mut self.shown) {
-            self.index.set_transform(instance, Transform::Affine(gone));
-        }
-        for &instance in instances {
-            self.index.set_transform(instance, Transform::Affine(self.poses[instance as usize]));
-        }
-        self.shown = instances.to_vec();
+        self.paint_held_out(instances, view, options, None)
+    }
+
+    /// Draws `instances` alone, without what is held out of them. Memory while it works: some hundred bytes a sample.
+    pub fn paint_held_out(
+        &mut self,
+        instances: &[u32],
+        view: &View,
+        options: &PaintOptions,
+        holdout: Option<&Holdout>,
+    ) -> Result<Painted, ViewError> {
+        self.show(instances, view);
         let samples = options.samples.max(1);
-        let fine = View { width: view.width * samples, height: view.height * samples, ..*view };
+        let fine = options.fine(view);
         let frame = self.renderer.render(&self.index, &fine, &options.render)?;
-        let image = self.shader.shade(self.index.scene(), &frame, options.shading);
+        let mut image = self.shader.shade(self.index.scene(), &frame, options.shading);
+        if let Some(holdout) = holdout.filter(|h| h.samples() > 0) {
+            for (pixel, at) in image.pixels.iter_mut().zip(0u32..) {
+                if holdout.holds(at % fine.width, at / fine.width) {
+                    *pixel = [0.0; 4];
+                }
+            }
+        }
         let pixels = reduced(&image.pixels, fine.width, samples);
         let sprite = Sprite::cut(view.width, &pixels);
         let mean = |x: u32, y: u32| {
@@ -116,6 +139,15 @@ impl LayerPainter {
         let painted = Painted { distances: distances.collect(), sprite };
         self.renderer.recycle(frame);
         Ok(painted)
+    }
+
+    /// Puts `instances` in their places and all others out of sight.
+    pub(super) fn show(&mut self, instances: &[u32], view: &View) {
+        let gone = hidden(&view.view_from_world.inverse());
+        let hide = std::mem::take(&mut self.shown).into_iter().map(|i| (i, Transform::Affine(gone)));
+        let show = instances.iter().map(|&i| (i, Transform::Affine(self.poses[i as usize])));
+        self.index.set_transforms(hide.chain(show));
+        self.shown = instances.to_vec();
     }
 
     /// Draws everything: what the composite is compared with.

@@ -106,7 +106,7 @@ impl Planner {
 
 /// The strongly connected components of some layers, each ascending, front to back (Tarjan 1972; recursion as
 /// deep as there are layers in a cycle is avoided by removing what nothing occludes first).
-fn components(layers: &[u32], occluders: &[Vec<u32>]) -> Vec<Vec<u32>> {
+pub(super) fn components(layers: &[u32], occluders: &[Vec<u32>]) -> Vec<Vec<u32>> {
     let mut search = Tarjan {
         member: vec![false; occluders.len()],
         index: vec![0; occluders.len()],

@@ -1,5 +1,6 @@
 //! The occlusion graph: arcs among given parts, or among all, and the pairs that intersect.
 
+use super::known::Says;
 use super::pairs::Pair;
 use super::sort::VisibilitySort;
 use crate::geometry::Witness;
@@ -36,6 +37,12 @@ impl VisibilitySort {
             }
         }
         false
+    }
+
+    /// Whether what is known of two parts ([`Known`](super::Known)) says that `front` does not occlude `behind` from
+    /// the eye of the last sort.
+    pub fn rules_out(&self, front: u32, behind: u32) -> bool {
+        self.known_says(front, behind) == Some(Says::No)
     }
 
     /// All arcs of the occlusion graph, ascending. Cost: linear in candidate pairs, of which there are many more

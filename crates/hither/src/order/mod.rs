@@ -19,6 +19,7 @@ mod kd_tree;
 mod known;
 mod pairs;
 mod parts;
+mod presplit;
 mod sort;
 mod split;
 #[cfg(test)]
@@ -26,7 +27,8 @@ mod tests;
 
 pub use extents::Direction;
 pub use known::Known;
-pub use parts::{Granularity, Part, Parts, PartsError};
+pub use parts::{Granularity, Part, Parts, PartsError, Shapes};
+pub use presplit::{PreSplit, split_nodes};
 pub use sort::VisibilitySort;
 pub use split::{Seam, SplitBy, SplitMesh, split};
 

@@ -20,6 +20,21 @@ pub enum Granularity {
     Names(Vec<String>),
 }
 
+/// What is put around parts, and what stays apart.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shapes {
+    /// Up to so many hulls a mesh; 0 means 1. A mesh that is not convex is divided where it is least so
+    /// ([`SplitBy::Adaptive`]) and the hulls are put around the pieces, until no surface is deeper inside its hull than
+    /// a hundredth of the mesh's size. What is drawn is not divided.
+    pub hulls: u32,
+    /// Each hull is made smaller about its centre by this share: parts that only touch, or sink into each other a
+    /// little, then have an order, at the price of what shows of that. 0 is safe.
+    pub shrink: f64,
+    /// Nodes of the root group, ascending, that are parts of their own whatever the granularity:
+    /// [`PreSplit::pieces`](super::PreSplit::pieces).
+    pub apart: Vec<u32>,
+}
+
 /// A part: instances that are sorted as one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Part {
@@ -63,21 +78,11 @@ impl Parts {
     /// The parts of `scene`, and a hull for each mesh they show. Cost: the vertices of these meshes, and the
     /// instances.
     pub fn of(scene: &Scene, granularity: &Granularity) -> Result<Parts, PartsError> {
-        Parts::with_hulls(scene, granularity, 1, 0.0)
+        Parts::shaped(scene, granularity, &Shapes::default())
     }
 
-    /// As [`Parts::of`], with up to `hulls` hulls a mesh: a mesh that is not convex is divided where it is least so
-    /// ([`SplitBy::Adaptive`]) and the hulls are put around the pieces, until no surface is deeper inside its hull
-    /// than a hundredth of the mesh's size. What is drawn is not divided.
-    ///
-    /// `shrink` makes each hull smaller about its centre by this share: parts that only touch, or sink into each other
-    /// a little, then have an order, at the price of what shows of that. 0 is safe.
-    pub fn with_hulls(
-        scene: &Scene,
-        granularity: &Granularity,
-        hulls: u32,
-        shrink: f64,
-    ) -> Result<Parts, PartsError> {
+    /// As [`Parts::of`], with hulls as `shapes` says.
+    pub fn shaped(scene: &Scene, granularity: &Granularity, shapes: &Shapes) -> Result<Parts, PartsError> {
         let count = scene.instance_count();
         if count > MOST_INSTANCES {
             return Err(PartsError::TooMany(count));
@@ -97,7 +102,9 @@ impl Parts {
                 let bits = corners.map(|p| p.to_array().map(f32::to_bits)).collect();
                 let add = || {
                     let first = found.hulls.len() as u32;
-                    found.hulls.extend(hulls_around(mesh, hulls).iter().map(|hull| shrunk(hull, shrink)));
+                    found.hulls.extend(
+                        hulls_around(mesh, shapes.hulls).iter().map(|hull| shrunk(hull, shapes.shrink)),
+                    );
                     first..found.hulls.len() as u32
                 };
                 hulls_of_points.entry(bits).or_insert_with(add).clone()
@@ -106,6 +113,8 @@ impl Parts {
                 found.empty_instances.push(number as u32);
                 continue;
             }
+            let apart = matches!(instance.path[..], [node] if shapes.apart.binary_search(&node).is_ok());
+            let granularity = if apart { &Granularity::Instances } else { granularity };
             let (owner, name) = owner(scene, instance, number, granularity, &mut used);
             let at = *part_of_owner.entry(owner).or_insert_with(|| {
                 found.parts.push(Part { name, ..Part::default() });

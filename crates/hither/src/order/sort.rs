@@ -397,14 +397,10 @@ impl VisibilitySort {
     #[inline]
     pub(super) fn occludes(&mut self, pair: Pair, witness: &mut Witness) -> bool {
         let (front, behind) = (&self.pieces[pair.front as usize], &self.pieces[pair.behind as usize]);
-        if self.parts[front.part as usize].has_known
-            && let Some(&(known, first)) = self.known.get(&pair_key(front.part, behind.part))
-        {
-            match known.says(self.eye, first) {
-                Says::No => return false,
-                Says::Yes => return true,
-                Says::AskHulls => {}
-            }
+        match self.known_says(front.part, behind.part) {
+            Some(Says::No) => return false,
+            Some(Says::Yes) => return true,
+            Some(Says::AskHulls) | None => {}
         }
         self.counters.exact_tests += 1;
         let hull = |piece: &Piece| &self.hulls[piece.hull as usize];
@@ -417,6 +413,16 @@ impl VisibilitySort {
             margin = self.options.slack * far(&shadow, behind.radius).min(far(&body, front.radius));
         }
         !disjoint(&shadow, &body, witness, margin)
+    }
+
+    /// What is known of two parts, if anything.
+    #[inline]
+    pub(super) fn known_says(&self, front: u32, behind: u32) -> Option<Says> {
+        if !self.parts[front as usize].has_known {
+            return None;
+        }
+        let &(known, first) = self.known.get(&pair_key(front, behind))?;
+        Some(known.says(self.eye, first))
     }
 
     /// Whether two pieces intersect, wherever the eye is.

@@ -56,7 +56,8 @@ impl Reuse {
                 }
                 all = all.zip(now).map(|(a, b)| [a, b].concat());
             }
-            let several = layer.parts.len() > 1;
+            // What is cut from a layer changes from frame to frame.
+            let several = layer.parts.len() > 1 || layer.held_out > 0;
             let fit = self.layers.recall(&layer.parts, all.as_deref(), self.budget_px).filter(|_| !several);
             let share = anew / layer.parts.len() as f64;
             layer.parts.iter().for_each(|_| self.count(false, fit.is_none(), share));

@@ -1,10 +1,10 @@
 //! A picture by layers: whole parts sorted, each drawn alone, composited.
 
-use crate::commands::sorting::{PartOptions, Sorting};
+use crate::commands::sorting::{LayerOptions, PartOptions, Prepared, Sorting};
 use crate::console::Verbosity;
 use crate::failure::Failure;
 use hither::Scene;
-use hither::layers::{LayerPainter, PaintOptions, Program, Sprite, decompose};
+use hither::layers::{LayerPainter, PaintOptions, Program, Sprite};
 use hither::order::SortOptions;
 use hither::render::{Frame, Image, Shading};
 
@@ -20,17 +20,17 @@ pub fn picture(
     let view = &frame.view;
     let slack = 1.0 / (256.0 * view.pixels_per_unit()) + 1e-6;
     let options = SortOptions { slack, ..SortOptions::default() };
-    let mut sorting = Sorting::new(scene, source, &PartOptions::default(), options, verbosity)?;
+    let parts = PartOptions::default();
+    // Nothing is split, and the scene stays as it is.
+    let prepared = Prepared::of(scene);
+    let mut sorting = Sorting::new(scene, source, &parts, &prepared, options, verbosity)?;
     sorting.sort(scene, view);
-    let order = sorting.sort.order().clone();
-    let components = decompose(&order, |group| sorting.sort.arcs_among(group));
     let mut painter = LayerPainter::new(scene);
     let paint = PaintOptions { shading, ..PaintOptions::default() };
+    let (components, _) = sorting.components(&LayerOptions::default(), &mut painter, view, &paint)?;
     let mut sprites: Vec<Sprite> = Vec::new();
     for parts in components.iter().flat_map(|c| &c.layers) {
-        let of = |&part: &u32| sorting.parts.parts[part as usize].instances.iter().copied();
-        let mut instances: Vec<u32> = parts.iter().flat_map(of).collect();
-        instances.sort_unstable();
+        let instances = sorting.instances_of(parts);
         let painted = painter.paint(&instances, view, &paint).map_err(|e| Failure::work(e.to_string()))?;
         sprites.push(painted.sprite);
         if parts.len() > 1 {

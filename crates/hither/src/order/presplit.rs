@@ -1,0 +1,150 @@
+//! Nodes of a scene whose meshes are pre-split, each piece a node and a part of its own [Snyder & Lengyel 1997, §9].
+
+use super::known::Known;
+use super::parts::PartsError;
+use super::split::{Seam, SplitBy, SplitMesh, split};
+use crate::scene::{Content, Node, Scene};
+use glam::DAffine3;
+use std::collections::HashMap;
+
+/// A scene with some of its meshes in pieces.
+#[derive(Clone, Debug, Default)]
+pub struct PreSplit {
+    /// The scene. Nodes keep their numbers; pieces come after them as children of the nodes that had their meshes, and
+    /// move with them.
+    pub scene: Scene,
+    /// The pieces' nodes in the root group, ascending.
+    pub pieces: Vec<u32>,
+    /// Seams between pieces, by their nodes, in the space of their meshes.
+    pub seams: Vec<(u32, u32, Seam)>,
+}
+
+/// Splits the meshes of, and below, the root group's nodes of the given names. `overlap` is as for [`split`]. Piece k
+/// of a node is called by the node's name and k. A mesh that is one piece stays as it is.
+///
+/// # Errors
+/// A name that no node with a mesh of or below it has.
+pub fn split_nodes(mut scene: Scene, by: &[(String, SplitBy)], overlap: f64) -> Result<PreSplit, PartsError> {
+    let (mut pieces, mut seams) = (Vec::new(), Vec::new());
+    let mut known: HashMap<(u32, usize), (u32, SplitMesh)> = HashMap::new();
+    let root = scene.root as usize;
+    for (rule, (name, by)) in by.iter().enumerate() {
+        let nodes = meshes_below(&scene.groups[root].nodes, name);
+        if nodes.is_empty() {
+            return Err(PartsError::UnknownName(name.clone()));
+        }
+        for (node, mesh) in nodes {
+            let (first_mesh, split) = known.entry((mesh, rule)).or_insert_with(|| {
+                let split = split(&scene.meshes[mesh as usize], by, overlap);
+                let first = scene.meshes.len() as u32;
+                if split.pieces.len() > 1 {
+                    scene.meshes.extend(split.pieces.iter().cloned());
+                }
+                (first, split)
+            });
+            if split.pieces.len() < 2 {
+                continue;
+            }
+            let nodes = &mut scene.groups[root].nodes;
+            nodes[node as usize].content = Content::Nothing;
+            let called = match nodes[node as usize].name.as_str() {
+                "" => name.clone(),
+                own => own.to_owned(),
+            };
+            let first = nodes.len() as u32;
+            for piece in 0..split.pieces.len() as u32 {
+                pieces.push(first + piece);
+                nodes.push(Node {
+                    name: format!("{called} {piece}"),
+                    parent: Some(node),
+                    content: Content::Mesh(*first_mesh + piece),
+                    ..Node::default()
+                });
+            }
+            seams.extend(split.seams.iter().map(|s| (first + s.first, first + s.second, *s)));
+        }
+    }
+    Ok(PreSplit { scene, pieces, seams })
+}
+
+/// The nodes with a mesh among those of a name and what is below them, with their meshes.
+fn meshes_below(nodes: &[Node], name: &str) -> Vec<(u32, u32)> {
+    let mut inside = vec![false; nodes.len()];
+    let mut found = Vec::new();
+    for (i, node) in nodes.iter().enumerate() {
+        inside[i] = node.name == name || node.parent.is_some_and(|p| inside[p as usize]);
+        if let (true, Content::Mesh(mesh)) = (inside[i], node.content) {
+            found.push((i as u32, mesh));
+        }
+    }
+    found
+}
+
+impl Seam {
+    /// The plane in world space, with the mesh posed; `None` where the pose flattens it.
+    pub fn known(&self, world_from_mesh: &DAffine3) -> Option<Known> {
+        let normal = world_from_mesh.matrix3.inverse().transpose() * self.normal;
+        let offset = self.offset + normal.dot(world_from_mesh.translation);
+        let length = normal.length();
+        let plane = Known::Plane { normal: normal / length, offset: offset / length };
+        (length.is_normal() && (normal / length).is_finite() && offset.is_finite()).then_some(plane)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Mesh, Primitive};
+    use glam::{DVec3, Vec3};
+
+    /// A strip of quads along x, under two nodes of which one is called "ground".
+    fn strip() -> Scene {
+        let mut mesh = Mesh::default();
+        for x in 0..9 {
+            mesh.positions.extend([0.0, 1.0].map(|z| Vec3::new(x as f32, 0.0, z)));
+        }
+        mesh.triangles =
+            (0..8).flat_map(|i| [[2 * i, 2 * i + 1, 2 * i + 2], [2 * i + 2, 2 * i + 1, 2 * i + 3]]).collect();
+        mesh.primitives = vec![Primitive { triangles: 0..16, material: None }];
+        let mut scene = Scene::new("strip");
+        scene.meshes.push(mesh);
+        let nodes = &mut scene.groups[0].nodes;
+        nodes.push(Node { name: "ground".into(), ..Node::default() });
+        nodes.push(Node { parent: Some(0), content: Content::Mesh(0), ..Node::default() });
+        nodes.push(Node { name: "other".into(), content: Content::Mesh(0), ..Node::default() });
+        scene
+    }
+
+    #[test]
+    fn what_is_below_a_name_is_split_and_nothing_else() {
+        let by = SplitBy::HeightField { columns: 4, rows: 1 };
+        let found = split_nodes(strip(), &[("ground".into(), by)], 0.2).unwrap();
+        assert_eq!(found.pieces, [3, 4, 5, 6]);
+        assert_eq!(found.seams.len(), 3);
+        let nodes = &found.scene.root_group().nodes;
+        assert_eq!((nodes[1].content, nodes[2].content), (Content::Nothing, Content::Mesh(0)));
+        assert_eq!((nodes[3].name.as_str(), nodes[3].parent), ("ground 0", Some(1)));
+        assert_eq!(found.scene.instances().len(), 5);
+        let unknown = split_nodes(strip(), &[("sea".into(), by)], 0.2).unwrap_err();
+        assert_eq!(unknown, PartsError::UnknownName("sea".into()));
+        let whole = SplitBy::HeightField { columns: 1, rows: 1 };
+        assert!(split_nodes(strip(), &[("ground".into(), whole)], 0.2).unwrap().pieces.is_empty());
+    }
+
+    #[test]
+    fn a_seam_moves_with_its_mesh() {
+        let seam = Seam { first: 0, second: 1, normal: DVec3::new(0.6, 0.0, 0.8), offset: 2.0 };
+        let pose = DAffine3::from_scale_rotation_translation(
+            DVec3::new(2.0, 1.0, -3.0),
+            glam::DQuat::from_rotation_y(0.7),
+            DVec3::new(5.0, 6.0, 7.0),
+        );
+        let Some(Known::Plane { normal, offset }) = seam.known(&pose) else { panic!("no plane") };
+        for p in [DVec3::new(1.0, 2.0, 3.0), DVec3::new(-4.0, 0.5, 2.0), DVec3::new(2.0, 9.0, 2.0)] {
+            let (here, there) =
+                (seam.normal.dot(p) - seam.offset, normal.dot(pose.transform_point3(p)) - offset);
+            assert!(here * there > 0.0);
+        }
+        assert_eq!(seam.known(&DAffine3::from_scale(DVec3::ZERO)), None);
+    }
+}
