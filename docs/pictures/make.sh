@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the pictures of the documentation, all from generated worlds. Takes about a minute after the build.
+# Makes the pictures of the documentation, from generated worlds and ring.obj. Takes about a minute after the build.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 cargo build --release --package hither-cli
@@ -15,3 +15,14 @@ hither render "$office" --camera open --size 480x270 --shade complexity --algori
   -o docs/pictures/work-zbuffer.png
 hither lines 'world:office?n=1' --camera corridor --faces flat --size 960x540 -o docs/pictures/office-lines.svg
 hither render world:hills --camera valley --size 960x540 --background $sky -o docs/pictures/hills.png
+
+# Figure 2c of Snyder & Lengyel 1997: needs Graphviz.
+above='--eye 0,5,0 --up 0,0,1'
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+hither render docs/pictures/ring.obj $above --size 240x240 --shade ids --background $sky -o docs/pictures/ring.png
+hither order docs/pictures/ring.obj $above --dot "$work/ring.dot"
+dot -Tsvg "$work/ring.dot" -o docs/pictures/ring.svg
+hither layers 'world:toothpicks?n=60' -o "$work/layers" --size 320x180 --samples 3 \
+  --focus 4.4 --f-number 1 --focal-length 300 --lens-samples 21
+cp "$work"/layers/focus{,-single,-truth}.png docs/pictures/
