@@ -83,6 +83,7 @@ fn split(mesh: &Mesh, triangles_per_object: usize) -> Vec<Mesh> {
                 colors: mesh.colors[range].to_vec(),
                 triangles: triangles.iter().map(|t| t.map(|v| v - first)).collect(),
                 primitives: vec![Primitive { triangles: 0..triangles.len() as u32, material }],
+                lines: vec![],
             }
         })
         .collect()

@@ -8,7 +8,7 @@ use std::process::Command;
 
 const ENGINE: &str = "hither";
 const ALLOWED: &[&str] =
-    &["fearless_simd", "glam", "i_overlay", "parry3d-f64", "rayon", "robust", "thiserror"];
+    &["fearless_simd", "glam", "i_overlay", "i_triangle", "parry3d-f64", "rayon", "robust", "thiserror"];
 
 /// Checks the engine's dependencies, build dependencies included; tests may use what they like.
 pub fn check(root: &Path) -> Result<Vec<Finding>> {

@@ -45,6 +45,8 @@ fn write_view(file: &mut dyn Write, sheet: &Sheet, view: &SheetView) -> io::Resu
         serde_json::to_writer(&mut *file, sheet.part_name(face.part))?;
         write!(file, ",\"triangle\":{},\"cut\":{},\"color\":", face.triangle, face.cut)?;
         serde_json::to_writer(&mut *file, &face.color)?;
+        write!(file, ",\"opacity\":{},\"through\":", face.opacity)?;
+        serde_json::to_writer(&mut *file, &face.through)?;
         file.write_all(b",\"contours\":[")?;
         for (k, contour) in face.contours.iter().enumerate() {
             if k > 0 {

@@ -4,6 +4,7 @@
 
 mod dxf;
 mod json;
+mod palette;
 mod svg;
 
 pub use dxf::write_dxf;

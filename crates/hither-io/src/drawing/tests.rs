@@ -28,6 +28,8 @@ fn drawing() -> Drawing {
         ],
         faces: vec![Face {
             part: 1,
+            through: Vec::new(),
+            opacity: 1.0,
             triangle: 4,
             cut: false,
             color: [255, 0, 16],
@@ -77,6 +79,10 @@ fn dxf_has_layers_and_polylines_with_y_up() {
     let text = written(write_dxf, "dxf");
     assert!(text.contains("POLYLINE\n8\nVISIBLE_SILHOUETTE\n"));
     assert!(text.contains("VERTEX\n8\nHIDDEN_CREASE\n10\n7.000000\n20\n22.000000\n"), "{text}");
+    let solid = "SOLID\n8\nFACES\n62\n10\n10\n";
+    assert_eq!(text.matches(solid).count(), 1, "{text}");
+    assert!(text.contains("POLYLINE\n8\nFACE_OUTLINES\n62\n10\n66\n1\n70\n1\n"));
+    assert!(text.find("SOLID") < text.find("VISIBLE_SILHOUETTE\n66"));
     assert!(text.ends_with("0\nENDSEC\n0\nEOF\n"));
 }
 

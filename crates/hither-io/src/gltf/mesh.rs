@@ -1,4 +1,5 @@
-//! Meshes: primitives of every triangle mode become one indexed triangle list with its attributes.
+//! Meshes: primitives of every triangle mode become one indexed triangle list with its attributes, those of
+//! lines the mesh's own lines.
 //!
 //! Triangles keep the order of the file, strips and fans expanded. An index out of range is refused; a
 //! triangle that touches a position which is no number is left out and told of. Primitives that share
@@ -10,6 +11,7 @@ use super::attributes::{self, Attributes, Vertices};
 use super::buffers::Buffers;
 use super::fault::{Fault, Oddities, malformed, part, unsupported};
 use super::json;
+use super::lines;
 use super::material::Materials;
 use glam::Vec3;
 use hither::scene::{Mesh, Primitive};
@@ -26,8 +28,14 @@ pub(super) fn read(
     let source = &buffers.document().meshes[index];
     let place = part("mesh", index, &source.name);
     let mut runs = Vec::new();
+    let mut mesh = Mesh { name: source.name.clone(), ..Mesh::default() };
     for (i, primitive) in source.primitives.iter().enumerate() {
         let here = || format!("{place}, primitive {i}");
+        if lines::are_in(primitive) {
+            let odd = lines::read(buffers, primitive, &mut mesh.lines).map_err(|f| f.at(here()))?;
+            odd.into_iter().for_each(|oddity| oddities.note(here(), oddity));
+            continue;
+        }
         match Run::read(buffers, materials, primitive).map_err(|f| f.at(here()))? {
             Ok(run) => runs.push((i, run)),
             Err(oddity) => oddities.note(if oddity == THIN { place.clone() } else { here() }, oddity),
@@ -36,7 +44,6 @@ pub(super) fn read(
     if source.primitives.iter().any(|p| !p.targets.is_empty()) {
         oddities.note(&*place, "has morph targets, which are left out; it is drawn in its rest shape");
     }
-    let mut mesh = Mesh { name: source.name.clone(), ..Mesh::default() };
     let mut vertices = Vertices::new(buffers, runs.iter().map(|(_, run)| &run.attributes));
     let ranges = ranges(&runs);
     for (i, run) in runs {
@@ -77,8 +84,8 @@ impl Mode {
     }
 }
 
-/// Why points and lines are not there.
-const THIN: &str = "its points and lines are left out";
+/// Why points are not there.
+const THIN: &str = "its points are left out";
 /// Why a mesh, or a whole file, is refused.
 pub(super) const DRACO_IS_NOT_READ: &str = "it is compressed with Draco (KHR_draco_mesh_compression), which is not read; convert the \
                      file to one without, for example by opening it in Blender and exporting it uncompressed";
@@ -103,7 +110,7 @@ impl<'a> Run<'a> {
     ) -> Result<Result<Run<'a>, &'static str>, Fault> {
         let material = materials.scene_index(primitive.material)?;
         let mode = match primitive.mode.map_or(4, |m| m.0) {
-            0..=3 => return Ok(Err(THIN)),
+            0 => return Ok(Err(THIN)),
             4 => Mode::Triangles,
             5 => Mode::Strip,
             6 => Mode::Fan,

@@ -12,6 +12,7 @@ mod camera;
 mod container;
 mod fault;
 mod json;
+mod lines;
 mod material;
 mod mesh;
 mod meshopt;

@@ -7,13 +7,14 @@ use crate::polygon::{self, Fit, Triangulator};
 use glam::{Vec2, Vec3, Vec4};
 use hither::scene::{Content, Material, Mesh, Node, Primitive, Scene};
 
-/// Makes a mesh and a node of every part that has triangles.
+/// Makes a mesh and a node of every part that has triangles or lines.
 pub(super) fn build(statements: Statements, materials: Materials, oddities: &mut Oddities) -> Scene {
     let mut scene = Scene::new("");
     let mut runs_of_part: Vec<Vec<usize>> = vec![Vec::new(); statements.parts.len()];
     for (i, run) in statements.runs.iter().enumerate() {
         runs_of_part[run.part as usize].push(i);
     }
+    let mut lines_of_part = lines(&statements, oddities);
     let mut welder = Welder { first: vec![NONE; statements.positions.len()], vertices: Vec::new() };
     let mut builder = Builder {
         normals: statements.normals.clone(),
@@ -26,8 +27,9 @@ pub(super) fn build(statements: Statements, materials: Materials, oddities: &mut
         oddities,
     };
     for (part, runs) in runs_of_part.iter().enumerate() {
-        let mesh = builder.mesh(part, runs, &mut welder);
-        if !mesh.triangles.is_empty() {
+        let mut mesh = builder.mesh(part, runs, &mut welder);
+        mesh.lines = std::mem::take(&mut lines_of_part[part]);
+        if !mesh.triangles.is_empty() || !mesh.lines.is_empty() {
             let content = Content::Mesh(scene.meshes.len() as u32);
             scene.groups[0].push(Node { name: mesh.name.clone(), content, ..Node::default() });
             scene.meshes.push(mesh);
@@ -36,6 +38,25 @@ pub(super) fn build(statements: Statements, materials: Materials, oddities: &mut
     scene.materials = builder.materials.list;
     scene.textures = builder.materials.textures;
     scene
+}
+
+/// The lines of each part, without those that have no length.
+fn lines(statements: &Statements, oddities: &mut Oddities) -> Vec<Vec<[Vec3; 2]>> {
+    let mut lines = vec![Vec::new(); statements.parts.len()];
+    for &(part, ends, line) in &statements.segments {
+        match ends.map(|i| statements.positions.get(i as usize).copied()) {
+            [Some(a), Some(b)] if a.is_finite() && b.is_finite() => {
+                if a != b {
+                    lines[part as usize].push([a, b]);
+                }
+            }
+            [Some(_), Some(_)] => {
+                oddities.in_line(line.into(), "a line has a coordinate that is no number and is left out");
+            }
+            _ => oddities.in_line(line.into(), "a line names a vertex that does not exist and is left out"),
+        }
+    }
+    lines
 }
 
 struct Builder<'a> {

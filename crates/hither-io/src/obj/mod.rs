@@ -1,7 +1,7 @@
 //! Wavefront OBJ: polygons with texture coordinates, normals, vertex colours, groups and materials.
 //!
 //! What becomes of a file:
-//! - Each combination of object (`o`) and group (`g`) that has faces becomes one mesh and one node called
+//! - Each combination of object (`o`) and group (`g`) that has faces or lines becomes one mesh and one node called
 //!   `object/group`, wherever its faces are in the file; nodes are in order of first appearance. A new object
 //!   begins without a group.
 //! - Faces of any number of corners are cut into triangles; triangles without area are dropped. Vertices
@@ -10,7 +10,8 @@
 //!   other software shows is missing.
 //! - `Kd` and vertex colours are taken as sRGB, which is what software without colour management makes of
 //!   them. `d` or `Tr` below full opacity blends. Of textures only `map_Kd` is used.
-//! - Points, lines, curves and surfaces are left out with a diagnostic. `call` is never followed.
+//! - Lines (`l`) become the mesh's own lines, which drawings show. Points, curves and surfaces are left out with
+//!   a diagnostic. `call` is never followed.
 //! - Faces with an index out of range, or with a coordinate that is no number, are left out likewise.
 
 mod build;

@@ -37,6 +37,8 @@ pub(super) struct Statements {
     pub(super) faces: Vec<Face>,
     /// Faces of one part with one material, in a row.
     pub(super) runs: Vec<Run>,
+    /// Segments of lines (`l`): the part, the indices of two positions, and where they are in the file.
+    pub(super) segments: Vec<(u32, [u32; 2], u32)>,
     /// Names of parts: object, group, or both with a `/` between.
     pub(super) parts: Vec<String>,
     /// Names that `usemtl` gives.
@@ -74,6 +76,8 @@ struct State {
     material: u32,
     /// Whether the names have changed since the last face.
     changed: bool,
+    /// The part of these names, if it was needed.
+    part: Option<u32>,
     part_of_name: HashMap<String, u32>,
     material_of_name: HashMap<Vec<u8>, u32>,
     known_libraries: HashSet<Vec<u8>>,
@@ -87,6 +91,7 @@ pub(super) fn parse(bytes: &[u8], oddities: &mut Oddities) -> Result<Statements,
         group: String::new(),
         material: NONE,
         changed: true,
+        part: None,
         part_of_name: HashMap::new(),
         material_of_name: HashMap::new(),
         known_libraries: HashSet::new(),
@@ -105,7 +110,15 @@ pub(super) fn parse(bytes: &[u8], oddities: &mut Oddities) -> Result<Statements,
             _ => all.other(line, line_number, &mut state, oddities),
         }
         number = lines.number();
-        if all.corners.len().max(all.positions.len()).max(all.uvs.len()).max(all.normals.len()) >= MOST {
+        if all
+            .corners
+            .len()
+            .max(all.segments.len())
+            .max(all.positions.len())
+            .max(all.uvs.len())
+            .max(all.normals.len())
+            >= MOST
+        {
             return Err(TooLarge);
         }
     }
@@ -194,8 +207,31 @@ impl Statements {
         self.faces.push(Face { end: self.corners.len() as u32, line });
     }
 
-    fn begin_run(&mut self, state: &mut State) {
-        state.changed = false;
+    /// `l`: a line through corners; texture coordinates are of no use to it.
+    fn line(&mut self, line: &[u8], number: u64, state: &mut State, oddities: &mut Oddities) {
+        let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
+        let part = self.part(state);
+        let at = u32::try_from(number).unwrap_or(u32::MAX);
+        let (mut rest, mut before) = (line, None);
+        loop {
+            rest = rest.trim_ascii_start();
+            if rest.first().is_none_or(|&b| b == b'#') {
+                break;
+            }
+            let Some([position, ..]) = corner(&mut rest, counts) else {
+                return oddities.in_line(number, "a line cannot be read; what follows of it is left out");
+            };
+            if let Some(before) = before.replace(position) {
+                self.segments.push((part, [before, position], at));
+            }
+        }
+    }
+
+    /// The number of the part that new faces and lines belong to.
+    fn part(&mut self, state: &mut State) -> u32 {
+        if let Some(part) = state.part {
+            return part;
+        }
         let name = match (state.object.as_str(), state.group.as_str()) {
             (object, "") => object.to_owned(),
             ("", group) => group.to_owned(),
@@ -206,6 +242,13 @@ impl Statements {
             parts.push(name.clone());
             (parts.len() - 1) as u32
         });
+        state.part = Some(part);
+        part
+    }
+
+    fn begin_run(&mut self, state: &mut State) {
+        state.changed = false;
+        let part = self.part(state);
         let material = state.material;
         if self.runs.last().is_none_or(|run| run.part != part || run.material != material) {
             self.runs.push(Run { first_face: self.faces.len() as u32, part, material });
@@ -222,12 +265,12 @@ impl Statements {
             b"o" => {
                 state.object = String::from_utf8_lossy(rest).into_owned();
                 state.group.clear();
-                state.changed = true;
+                (state.changed, state.part) = (true, None);
             }
             b"g" => {
                 // Several names on a line put a face into several groups; together they name one part.
                 state.group = String::from_utf8_lossy(rest).into_owned();
-                state.changed = true;
+                (state.changed, state.part) = (true, None);
             }
             b"usemtl" => {
                 let materials = &mut self.materials;
@@ -246,8 +289,8 @@ impl Statements {
             b"s" | b"mg" | b"bevel" | b"c_interp" | b"d_interp" | b"lod" | b"usemap" | b"maplib"
             | b"shadow_obj" | b"trace_obj" => {}
             b"fo" => self.face(rest, number, state, oddities),
-            b"p" => oddities.in_line(number, "points are left out; only faces are read"),
-            b"l" => oddities.in_line(number, "lines are left out; only faces are read"),
+            b"p" => oddities.in_line(number, "points are left out; only faces and lines are read"),
+            b"l" => self.line(rest, number, state, oddities),
             b"call" | b"csh" => {
                 oddities
                     .in_line(number, "other files are not called, nor commands run; the line is left out");
@@ -255,7 +298,7 @@ impl Statements {
             b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"curv" | b"curv2" | b"surf" | b"parm"
             | b"trim" | b"hole" | b"scrv" | b"sp" | b"end" | b"con" | b"ctech" | b"stech" | b"bsp"
             | b"bzp" | b"cdc" | b"cdp" | b"res" => oddities.note("curves", place, || {
-                "curves and curved surfaces are left out; only faces are read".into()
+                "curves and curved surfaces are left out; only faces and lines are read".into()
             }),
             _ => {
                 self.known_lines -= 1;

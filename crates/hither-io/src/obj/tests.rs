@@ -89,16 +89,32 @@ fn an_odd_file_is_read_part_by_part() {
         "material \"not there\": it is not defined",
         "without area is left out (4 times)",
         "fewer than three corners",
-        "lines are left out",
         "points are left out",
-        "curves and curved surfaces are left out; only faces are read (2 times)",
+        "curves and curved surfaces are left out; only faces and lines are read (2 times)",
         "other files are not called",
         "crosses itself",
     ] {
         assert_eq!(told.iter().filter(|m| m.contains(part)).count(), 1, "{part} in {told:#?}");
     }
-    assert_eq!(told.len(), 9, "{told:#?}");
+    assert_eq!(told.len(), 8, "{told:#?}");
     assert!(told.iter().any(|m| m.starts_with("line 29: a face without area")), "{told:#?}");
+}
+
+#[test]
+fn lines_belong_to_their_part() {
+    let loaded = read(
+        "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nl 1 2 3\nf 1 2 3\nl -4/1 -2/1 # end\no wire\nl 2 3 3 1\n\
+         l 1 4\nl 1 9 2\nl 1 x\nl 2\no empty\n",
+    );
+    let [a, b, c] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Vec3::from);
+    let scene = &loaded.scene;
+    assert_eq!(parts(scene), [("a".to_owned(), 1, 0.5), ("wire".to_owned(), 0, 0.0)]);
+    assert_eq!(scene.meshes[0].lines, [[a, b], [b, c], [a, c]]);
+    assert_eq!(scene.meshes[1].lines, [[b, c], [c, a]]);
+    let told = messages(&loaded);
+    for part in ["coordinate that is no number", "names a vertex that does not exist", "cannot be read"] {
+        assert_eq!(told.iter().filter(|m| m.contains(part)).count(), 1, "{part} in {told:#?}");
+    }
 }
 
 #[test]

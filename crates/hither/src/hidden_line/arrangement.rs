@@ -8,6 +8,7 @@ use glam::DVec2;
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::float::simplify::SimplifyShape;
 use i_overlay::float::slice::FloatSlice;
+use i_triangle::float::triangulatable::Triangulatable;
 
 /// By how much lines are longer at both ends. More than rounding, less than anything that is drawn.
 const LONGER: f64 = 1e-6;
@@ -36,6 +37,23 @@ pub(super) fn merged(parts: &[Polygon]) -> Vec<Polygon> {
     let shapes: Vec<Vec<Vec<[f64; 2]>>> =
         parts.iter().map(|p| p.iter().map(|c| c.iter().map(|v| v.to_array()).collect()).collect()).collect();
     polygons(shapes.simplify_shape_as::<i64>(FillRule::EvenOdd))
+}
+
+/// What closed contours enclose: where their winding number is not 0, or else where it is odd.
+pub(super) fn enclosed(contours: &Polygon, winding: bool) -> Vec<Polygon> {
+    let contours: Vec<Vec<[f64; 2]>> =
+        contours.iter().map(|c| c.iter().map(|v| v.to_array()).collect()).collect();
+    let rule = if winding { FillRule::NonZero } else { FillRule::EvenOdd };
+    polygons(contours.simplify_shape_as::<i64>(rule))
+}
+
+/// A polygon as triangles, counter-clockwise if +y is up.
+pub(super) fn triangles(polygon: &Polygon) -> Vec<[DVec2; 3]> {
+    let contours: Vec<Vec<[f64; 2]>> =
+        polygon.iter().map(|c| c.iter().map(|v| v.to_array()).collect()).collect();
+    let mesh = contours.triangulate_as::<i64>().to_triangulation::<u32>();
+    let (corners, _) = mesh.indices.as_chunks::<3>();
+    corners.iter().map(|t| t.map(|i| DVec2::from(mesh.points[i as usize]))).collect()
 }
 
 fn polygons(shapes: Vec<Vec<Vec<[f64; 2]>>>) -> Vec<Polygon> {
@@ -108,6 +126,23 @@ mod tests {
         assert!((areas.iter().sum::<f64>() - 100.0).abs() < 1e-9);
         assert!((areas[0] - 4.0).abs() < 1e-9 && (areas[1] - 21.0).abs() < 1e-9, "{areas:?}");
         assert_eq!(regions.iter().filter(|r| r.len() == 2).count(), 1);
+    }
+
+    #[test]
+    fn a_polygon_with_holes_is_its_triangles() {
+        let v = DVec2::new;
+        let square = |x: f64, r: f64| vec![v(x - r, -r), v(x + r, -r), v(x + r, r), v(x - r, r)];
+        // A ring within which the two holes overlap.
+        let contours = vec![square(0.0, 5.0), square(-1.0, 2.0), square(1.0, 2.0)];
+        let odd = enclosed(&contours, false);
+        let sum = |shapes: &[Polygon]| -> f64 {
+            let all = shapes.iter().flat_map(triangles);
+            all.map(|t| (t[1] - t[0]).perp_dot(t[2] - t[0]).abs() * 0.5).sum()
+        };
+        assert!((sum(&odd) - (100.0 - 24.0 + 8.0)).abs() < 1e-9);
+        assert!((sum(&odd) - odd.iter().map(area).sum::<f64>()).abs() < 1e-9);
+        let wound = enclosed(&contours, true);
+        assert!((sum(&wound) - 100.0).abs() < 1e-9);
     }
 
     #[test]

@@ -27,6 +27,9 @@ const CHUNK: usize = 4096;
 /// The longest side of the grid, cells.
 const MOST_CELLS: usize = 768;
 
+/// Strokes that are shorter in all, pixels, are not drawn.
+const SPECK_PX: f64 = 1e-3;
+
 /// A line on the paper before it is joined to others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Piece {
@@ -83,11 +86,16 @@ impl Preparation {
         if let Some(cover) = &mut cover {
             cover.settle_cells(&shown, &occluders, |t| !see_through(t));
         }
+        // What is seen through hides nothing, but is seen, and meets others.
+        let surfaces =
+            sees_through(&shown, options).then(|| Occluders::new(&shown, grid, cover.as_ref(), |_| true));
         counters.triangles = shown.triangles.len() as u64;
         counters.triangles_live = occluders.list.len() as u64;
         let tracer = Tracer {
             shown: &shown,
             occluders: &occluders,
+            surfaces: surfaces.as_ref().unwrap_or(&occluders),
+            sees_through: surfaces.is_some(),
             cover: cover.as_ref(),
             picture,
             counts: options.hidden,
@@ -100,7 +108,8 @@ impl Preparation {
         counters.segments = pieces.len() as u64;
         counters.visible_segments = pieces.iter().filter(|p| p.covers == 0).count() as u64;
         coincident::draw_once(crew, &mut pieces);
-        let (points, strokes) = strokes::join(crew, pieces);
+        let (points, mut strokes) = strokes::join(crew, pieces);
+        strokes.retain(|s| !is_speck(&points[s.points.start as usize..s.points.end as usize]));
         Drawing { width: picture.x, height: picture.y, points, strokes, faces, counters }
     }
 
@@ -155,19 +164,15 @@ impl Preparation {
     }
 }
 
+/// Whether blended surfaces hide nothing, and there are any.
+fn sees_through(shown: &Shown, options: &LineOptions) -> bool {
+    !options.transparent_hides && shown.solids.iter().any(|s| !s.topology.see_through.is_empty())
+}
+
 /// Which triangles hide nothing.
 fn see_through<'a>(shown: &'a Shown, options: &LineOptions) -> impl Fn(u32) -> bool + use<'a> {
-    let asked = !options.transparent_hides && shown.solids.iter().any(|s| !s.topology.see_through.is_empty());
-    move |t: u32| {
-        asked && {
-            let solid = &shown.solids[shown.solid_of(t)];
-            if shown.cap(t).is_some() {
-                return false;
-            }
-            let of = &solid.topology.see_through;
-            !of.is_empty() && of[shown.origin(solid, t) as usize]
-        }
-    }
+    let asked = sees_through(shown, options);
+    move |t: u32| asked && shown.blends(t)
 }
 
 fn planes(view: &View, options: &LineOptions) -> Vec<HalfSpace> {
@@ -280,7 +285,8 @@ fn find_faces(tracer: &Tracer, options: &LineOptions, pieces: &mut Vec<Piece>) -
         return Vec::new();
     }
     // All lines bound faces, whichever of them are drawn.
-    let all = LineOptions { kinds: Kinds::ALL, crease_angle: 0.0, ..options.clone() };
+    let kinds = Kinds { marked: false, ..Kinds::ALL };
+    let all = LineOptions { kinds, crease_angle: 0.0, ..options.clone() };
     let mut aside = Counters::default();
     let mut bounds = trace_edges(tracer, &all, &mut aside);
     intersections::add(tracer, &all, &mut bounds, &mut aside);
@@ -289,6 +295,13 @@ fn find_faces(tracer: &Tracer, options: &LineOptions, pieces: &mut Vec<Piece>) -
         pieces.extend(hatch::lines(&faces::find(tracer, &bounds, FaceColor::Flat), spacing));
     }
     options.faces.map_or_else(Vec::new, |color| faces::find(tracer, &bounds, color))
+}
+
+/// Whether a stroke is so short that it is rounding: what is left of a line in a corner where surfaces meet. A
+/// round pen would make a dot of it.
+fn is_speck(points: &[DVec2]) -> bool {
+    let length: f64 = points.windows(2).map(|p| p[0].distance(p[1])).sum();
+    length < SPECK_PX
 }
 
 /// Turns the parts that tracing found into pieces.

@@ -1,5 +1,6 @@
 //! What a drawing consists of.
 
+use super::arrangement;
 use glam::DVec2;
 use std::ops::Range;
 
@@ -20,7 +21,7 @@ pub enum Kind {
     Contact,
     /// Where a material ends.
     Border,
-    /// What the user marked.
+    /// A line of the model, or an edge that the user marked.
     Marked,
     /// Filling of a face.
     Hatch,
@@ -72,25 +73,40 @@ pub struct Stroke {
 /// A visible region of one flat face, as a polygon with holes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Face {
-    /// The instance that it belongs to.
+    /// The instance that it belongs to: the one that hides what is behind, or, where there is none but blended
+    /// surfaces that do not, the farthest of these.
     pub part: u32,
+    /// The instances of the blended surfaces that it is seen through, the nearest first.
+    pub through: Vec<u32>,
     /// A triangle of the instance's mesh in whose plane it is; of a cut `u32::MAX`.
     pub triangle: u32,
     /// Whether it is where a section plane cuts.
     pub cut: bool,
-    /// sRGB.
+    /// sRGB, tinted by what it is seen through.
     pub color: [u8; 3],
+    /// 1, but for blended surfaces with nothing behind them.
+    pub opacity: f32,
     /// The outline and then the holes, pixels, +y down; closed, without repeating the first point.
     pub contours: Vec<Vec<DVec2>>,
 }
 
 impl Face {
+    /// Its colour on white paper, sRGB.
+    pub fn color_on_white(&self) -> [u8; 3] {
+        self.color.map(|c| (255.0 - self.opacity * (255.0 - f32::from(c))).round() as u8)
+    }
+
     /// Area without the holes, square pixels.
     pub fn area(&self) -> f64 {
         let twice =
             |c: &Vec<DVec2>| (0..c.len()).map(|i| c[i].perp_dot(c[(i + 1) % c.len()])).sum::<f64>().abs();
         let mut areas = self.contours.iter().map(twice);
         areas.next().map_or(0.0, |outer| (outer - areas.sum::<f64>()) * 0.5)
+    }
+
+    /// The face as triangles, for what cannot fill polygons with holes.
+    pub fn triangles(&self) -> Vec<[DVec2; 3]> {
+        arrangement::triangles(&self.contours)
     }
 }
 

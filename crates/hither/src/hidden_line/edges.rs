@@ -24,6 +24,9 @@ impl Choice {
 
     /// As what an edge is drawn, if it is.
     pub fn kind(&self, shown: &Shown, solid: &Solid, edge: &Edge) -> Option<Kind> {
+        if edge.triangles[0] == NONE {
+            return self.kinds.marked.then_some(Kind::Marked);
+        }
         let places = edge.triangles.map(|t| shown.place(solid, t));
         // Of a triangle that is cut, the edge may belong to another piece.
         let fate = |k: usize| {

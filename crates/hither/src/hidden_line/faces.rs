@@ -4,6 +4,9 @@
 //! cut the paper into regions, and within a region nothing changes: one face is seen in all of it. So a look
 //! at one point of a region tells what it shows. Regions of the same flat face are put together again. The
 //! polygons tile what is covered: they share their borders, and nothing hidden is among them.
+//!
+//! Where blended surfaces hide nothing, a region shows all of them as far as the first surface that does: as one
+//! polygon in the colour that they make together, so that the tiling stays one.
 
 use super::FaceColor;
 use super::arrangement::{self, Polygon};
@@ -25,36 +28,48 @@ pub(super) fn find(tracer: &Tracer, pieces: &[Piece], color: FaceColor) -> Vec<F
     let visible = pieces.iter().filter(|p| p.covers == 0).map(|p| p.ends);
     let regions = arrangement::cut(DVec2::ZERO, tracer.picture, visible);
     let mut flats: HashMap<*const Topology, Vec<u32>> = HashMap::new();
-    let mut groups: HashMap<Group, Vec<(u32, Polygon)>> = HashMap::new();
-    for region in regions {
-        let Some(triangle) = arrangement::point_inside(&region).and_then(|p| nearest(tracer, p)) else {
-            continue;
-        };
-        let group = group_of(tracer.shown, triangle, &mut flats);
-        groups.entry(group).or_default().push((triangle, region));
+    let mut groups: HashMap<Vec<Group>, Vec<Region>> = HashMap::new();
+    for polygon in regions {
+        let Some(p) = arrangement::point_inside(&polygon) else { continue };
+        let seen = seen(tracer, p);
+        if !seen.is_empty() {
+            let group = seen.iter().map(|&t| group_of(tracer.shown, t, &mut flats)).collect();
+            groups.entry(group).or_default().push(Region { seen, polygon });
+        }
     }
-    let mut groups: Vec<(Group, Vec<(u32, Polygon)>)> = groups.into_iter().collect();
-    groups.sort_by_key(|g| g.0);
+    let mut groups: Vec<(Vec<Group>, Vec<Region>)> = groups.into_iter().collect();
+    groups.sort_by(|a, b| a.0.cmp(&b.0));
     let mut faces = Vec::new();
     for (group, mut parts) in groups {
-        let triangle = parts.iter().map(|p| p.0).min().unwrap_or_default();
-        let color = shade(tracer.shown, triangle, color);
+        let Some((last, through)) = group.split_last() else { continue };
+        // The same, whichever region was found first.
+        let layer = |k: usize| parts.iter().map(|p| p.seen[k]).min().unwrap_or_default();
+        let seen: Vec<u32> = (0..group.len()).map(layer).collect();
+        let (color, opacity) = shade(tracer, &seen, color);
+        let triangle = tracer.shown.mesh_triangle(seen[through.len()]);
         let polygons: Vec<Polygon> = if parts.len() == 1 {
-            vec![parts.swap_remove(0).1]
+            vec![parts.swap_remove(0).polygon]
         } else {
-            arrangement::merged(&parts.into_iter().map(|p| p.1).collect::<Vec<_>>())
+            arrangement::merged(&parts.into_iter().map(|p| p.polygon).collect::<Vec<_>>())
         };
+        let through: Vec<u32> = through.iter().map(|g| g.part).collect();
         for mut contours in polygons {
             if area(&contours[0]) < LEAST_AREA {
                 continue;
             }
             contours.retain(|c| area(c) >= LEAST_AREA);
-            let of_mesh = tracer.shown.mesh_triangle(triangle);
-            faces.push(Face { part: group.part, triangle: of_mesh, cut: group.cut, color, contours });
+            let (part, cut, through) = (last.part, last.cut, through.clone());
+            faces.push(Face { part, through, triangle, cut, color, opacity, contours });
         }
     }
-    faces.sort_by_key(|f| (f.part, f.cut, f.color));
+    faces.sort_by_key(|f| (f.part, f.cut, f.color, f.opacity.to_bits()));
     faces
+}
+
+/// A region of the paper, and the triangles that are seen in it, nearest first.
+struct Region {
+    seen: Vec<u32>,
+    polygon: Polygon,
 }
 
 fn area(contour: &[DVec2]) -> f64 {
@@ -104,17 +119,20 @@ fn flat_runs(topology: &Topology) -> Vec<u32> {
     first
 }
 
-/// The nearest triangle at a point. Of several at the same depth that of the smallest part, then the first.
-fn nearest(tracer: &Tracer, p: DVec2) -> Option<u32> {
-    let (shown, occluders) = (tracer.shown, tracer.occluders);
-    let grid = &occluders.grid;
+/// What is seen at a point, nearest first: surfaces that hide nothing, and the first that does, if there is
+/// one. Of several at the same depth that counts of the smallest part, then the first.
+fn seen(tracer: &Tracer, p: DVec2) -> Vec<u32> {
+    let (shown, surfaces) = (tracer.shown, tracer.surfaces);
+    let grid = &surfaces.grid;
     let mut best: Option<(f64, u32)> = None;
-    for &i in occluders.in_cell(grid.index(grid.column(p.x), grid.row(p.y))) {
-        let occluder = &occluders.list[i as usize];
+    let mut through: Vec<(f64, u32)> = Vec::new();
+    for &i in surfaces.in_cell(grid.index(grid.column(p.x), grid.row(p.y))) {
+        let occluder = &surfaces.list[i as usize];
         if best.is_some_and(|(w, _)| f64::from(occluder.nearest) < w - shown.lens.coarse(w)) {
             break;
         }
-        let [a, b, c] = shown.corners(occluder.triangle);
+        let triangle = occluder.triangle;
+        let [a, b, c] = shown.corners(triangle);
         let at = p.extend(0.0);
         let sides = [(a, b), (b, c), (c, a)].map(|(a, b)| super::predicates::cross(a, b, at));
         if sides.iter().any(|&s| s < 0.0) && sides.iter().any(|&s| s > 0.0) {
@@ -122,29 +140,40 @@ fn nearest(tracer: &Tracer, p: DVec2) -> Option<u32> {
         }
         let (farthest, nearest) = (a.z.min(b.z).min(c.z), a.z.max(b.z).max(c.z));
         let w = Plane::through(a, b, c).at(p).clamp(farthest, nearest);
-        let rank = |t: u32| (shown.part_of(t), t);
-        let better = match best {
-            None => true,
-            Some((before, other)) => {
-                let same = shown.lens.same_depth(shown.corners_in_view(occluder.triangle), w);
-                if (w - before).abs() <= same { rank(occluder.triangle) < rank(other) } else { w > before }
-            }
-        };
-        if better {
-            best = Some((best.map_or(w, |b| b.0.max(w)), occluder.triangle));
+        if !tracer.hides(triangle) {
+            through.push((w, triangle));
+        } else if best.is_none_or(|before| is_before(shown, p, (w, triangle), before)) {
+            best = Some((best.map_or(w, |b| b.0.max(w)), triangle));
         }
     }
-    best.map(|b| b.1)
+    through.retain(|&surface| best.is_none_or(|best| is_before(shown, p, surface, best)));
+    through.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    through.into_iter().chain(best).map(|s| s.1).collect()
 }
 
-/// The colour of a face, sRGB.
-fn shade(shown: &Shown, triangle: u32, color: FaceColor) -> [u8; 3] {
-    let linear = match color {
-        FaceColor::White => Vec3::ONE,
-        FaceColor::Material => shown.color_of(triangle),
-        FaceColor::Flat => shown.color_of(triangle) * brightness(shown, triangle) as f32,
-    };
-    linear.to_array().map(|c| (srgb(c.clamp(0.0, 1.0)) * 255.0).round() as u8)
+/// Whether a surface at depth w counts before another one.
+fn is_before(shown: &Shown, p: DVec2, (w, triangle): (f64, u32), (before, other): (f64, u32)) -> bool {
+    let rank = |t: u32| (shown.part_of(t), t);
+    let same = shown.lens.same_depth(shown.corners_in_view(triangle), p.extend(w));
+    if (w - before).abs() <= same { rank(triangle) < rank(other) } else { w > before }
+}
+
+/// The colour of a face, sRGB, and its opacity: surfaces over one another, nearest first.
+fn shade(tracer: &Tracer, seen: &[u32], color: FaceColor) -> ([u8; 3], f32) {
+    let shown = tracer.shown;
+    let (mut sum, mut opacity) = (Vec3::ZERO, 0.0);
+    for &triangle in seen {
+        let linear = match color {
+            FaceColor::White => Vec3::ONE,
+            FaceColor::Material => shown.color_of(triangle),
+            FaceColor::Flat => shown.color_of(triangle) * brightness(shown, triangle) as f32,
+        };
+        let alpha = if tracer.hides(triangle) { 1.0 } else { shown.opacity_of(triangle) };
+        sum += linear * (alpha * (1.0 - opacity));
+        opacity += alpha * (1.0 - opacity);
+    }
+    let linear = if opacity > 0.0 { sum / opacity } else { sum };
+    (linear.to_array().map(|c| (srgb(c.clamp(0.0, 1.0)) * 255.0).round() as u8), opacity)
 }
 
 /// How bright a face is in a light from above the eye, 0 to 1; the same from both sides.

@@ -1,4 +1,5 @@
 //! Faces filled with parallel lines, for pens: the darker a face, the closer the lines; cuts at 45 degrees.
+//! All lie on one ladder of lines, so that a round surface's facets continue each other's.
 
 use super::arrangement::{self, Polygon};
 use super::draw::Piece;
@@ -12,12 +13,13 @@ const BRIGHTEST: f64 = 0.9;
 pub(super) fn lines(faces: &[Face], spacing: f64) -> Vec<Piece> {
     let mut pieces = Vec::new();
     for face in faces {
-        let [r, g, b] = face.color.map(|c| f64::from(c) / 255.0);
+        let [r, g, b] = face.color_on_white().map(|c| f64::from(c) / 255.0);
         let bright = 0.3 * r + 0.6 * g + 0.1 * b;
         if !face.cut && bright > BRIGHTEST {
             continue;
         }
-        let apart = if face.cut { spacing } else { spacing * (1.0 + 3.0 * bright) };
+        // Twice or four times as far apart where it is brighter: so every line goes on in darker neighbours.
+        let apart = if face.cut { spacing } else { spacing * (1.0 + 3.0 * bright).log2().round().exp2() };
         // Neighbouring parts are told apart by the direction.
         let angle = if face.cut || face.part % 2 == 0 { 45f64 } else { 135f64 };
         let along = DVec2::from_angle(angle.to_radians());

@@ -31,10 +31,10 @@ pub(super) fn hidden_part(shown: &Shown, p: DVec3, q: DVec3, triangle: u32) -> O
     if d0.abs() <= coarse || d1.abs() <= coarse {
         let in_view = shown.corners_in_view(triangle);
         // What is at the same place is neither before nor behind.
-        if d0.abs() <= shown.lens.same_depth(in_view, w0) {
+        if d0.abs() <= shown.lens.same_depth(in_view, p + (q - p) * inside.0.t) {
             d0 = 0.0;
         }
-        if d1.abs() <= shown.lens.same_depth(in_view, w1) {
+        if d1.abs() <= shown.lens.same_depth(in_view, p + (q - p) * inside.1.t) {
             d1 = 0.0;
         }
     }

@@ -7,10 +7,10 @@
 //! tolerance lies in it. The cut of an edge by a plane is computed the same for all triangles at that edge,
 //! so that the segments of neighbouring pairs meet in every bit.
 
-use super::draw::{Piece, has_edge, is_live, push_parts};
+use super::draw::{Piece, is_live, push_parts};
 use super::drawing::{Counters, Kind};
-use super::shown::Shown;
-use super::topology::{Mix, NONE};
+use super::shown::{SectionLine, Shown};
+use super::topology::{Mix, NONE, ordered};
 use super::trace::{NO_SHEET, Own, Scratch, Tracer};
 use super::{Kinds, LineOptions};
 use glam::DVec3;
@@ -40,7 +40,7 @@ struct Meeting {
 pub(super) fn add(tracer: &Tracer, options: &LineOptions, pieces: &mut Vec<Piece>, counters: &mut Counters) {
     let kinds = &options.kinds;
     let wanted = kinds.intersection || kinds.contact;
-    let (crew, list) = (tracer.shown.crew, &tracer.occluders.list);
+    let (crew, list) = (tracer.shown.crew, &tracer.surfaces.list);
     let mut planes = Vec::new();
     if wanted {
         crew.extend(&mut planes, list.len(), |i| Plane::of(tracer.shown, list[i].triangle));
@@ -60,7 +60,7 @@ pub(super) fn add(tracer: &Tracer, options: &LineOptions, pieces: &mut Vec<Piece
             };
             let own = Own {
                 owns: |t: u32| meeting.triangles.contains(&t),
-                anchored: true,
+                anchored: meeting.triangles.iter().any(|&t| tracer.hides(t)),
                 sheets: meeting.triangles.map(|t| sheet(t).unwrap_or(NO_SHEET)),
             };
             tracer.trace([p, q], &own, scratch);
@@ -85,7 +85,7 @@ fn meetings(tracer: &Tracer, kinds: &Kinds, planes: &[Plane]) -> Vec<Meeting> {
         return Vec::new();
     }
     let of_band = |band: usize| {
-        let rows = tracer.occluders.grid.rows;
+        let rows = tracer.surfaces.grid.rows;
         let rows = rows * band / BANDS..rows * (band + 1) / BANDS;
         let mut found = Vec::new();
         meetings_in_rows(tracer, planes, rows, &mut found);
@@ -113,16 +113,23 @@ pub(super) fn add_sections(tracer: &Tracer, all: bool, pieces: &mut Vec<Piece>, 
         if p.truncate() == q.truncate() {
             continue;
         }
-        let own = Own {
-            owns: |t: u32| has_edge(&shown.triangles[t as usize], line.vertices),
-            anchored: false,
-            sheets: [NO_SHEET; 2],
-        };
+        let own = Own { owns: |t: u32| is_cut_at(shown, line, t), anchored: false, sheets: [NO_SHEET; 2] };
         tracer.trace([p, q], &own, &mut scratch);
         push_parts(pieces, p, q, shown.solids[line.solid as usize].part, Kind::Section, &scratch);
         counters.lines += 1;
     }
     counters.tests += scratch.tests;
+}
+
+/// Whether a line of a cut is part of a triangle: of what is left of the triangle that is cut, or of a cap in
+/// the same plane.
+fn is_cut_at(shown: &Shown, line: &SectionLine, triangle: u32) -> bool {
+    if let Some(cap) = shown.cap(triangle) {
+        return cap.plane == line.plane || (line.triangle == NONE && cap.solid == line.solid);
+    }
+    let solid = &shown.solids[line.solid as usize];
+    let (first, end) = (solid.first_triangle, solid.first_triangle + solid.triangle_count);
+    (first..end).contains(&triangle) && shown.origin(solid, triangle) == line.triangle
 }
 
 /// The plane of a triangle in view space.
@@ -149,7 +156,7 @@ impl Plane {
 
 /// The meetings of pairs of triangles that share a cell of these rows, each once.
 fn meetings_in_rows(tracer: &Tracer, planes: &[Plane], rows: Range<usize>, found: &mut Vec<Meeting>) {
-    let (shown, occluders) = (tracer.shown, tracer.occluders);
+    let (shown, occluders) = (tracer.shown, tracer.surfaces);
     let grid = &occluders.grid;
     // A plane's offset is rounded: what it rejects must be clearly beyond the tolerance.
     let clear = shown.lens.tolerance * 2.0;
@@ -198,16 +205,15 @@ fn meeting(shown: &Shown, a: u32, b: u32) -> Option<Meeting> {
         return None;
     }
     let vertices = [a, b].map(|t| shown.triangles[t as usize]);
-    if vertices[0].iter().filter(|v| vertices[1].contains(v)).count() > 1 {
+    if vertices[0].iter().filter(|v| vertices[1].contains(v)).count() > 1 || abut(shown, a, b) {
         return None;
     }
     debug_assert!(is_live(shown, a) && is_live(shown, b));
     let corners = [shown.corners_in_view(a), shown.corners_in_view(b)];
-    let tolerance = shown.lens.tolerance;
     let normal = |c: &[DVec3; 3]| (c[1] - c[0]).cross(c[2] - c[0]).normalize_or_zero();
     let n = [normal(&corners[0]), normal(&corners[1])];
-    let sides_b = sides(&corners[1], corners[0][0], n[0], tolerance)?;
-    let sides_a = sides(&corners[0], corners[1][0], n[1], tolerance)?;
+    let sides_b = sides(shown, &corners[1], &corners[0], n[0])?;
+    let sides_a = sides(shown, &corners[0], &corners[1], n[1])?;
     let direction = n[0].cross(n[1]);
     if direction.length_squared() < PARALLEL * PARALLEL {
         return None;
@@ -222,7 +228,7 @@ fn meeting(shown: &Shown, a: u32, b: u32) -> Option<Meeting> {
     if along(of_b[1]) < along(of_a[1]) {
         of_a[1] = of_b[1];
     }
-    if along(of_a[1]) - along(of_a[0]) <= tolerance {
+    if along(of_a[1]) - along(of_a[0]) <= shown.lens.rounding_of_point(of_a[0]) {
         return None;
     }
     let passes = passes_through(shown, a, &sides_a, corners[1][0], n[1])
@@ -231,12 +237,23 @@ fn meeting(shown: &Shown, a: u32, b: u32) -> Option<Meeting> {
     Some(Meeting { ends: of_a, kind, triangles: [a, b], repeats: false })
 }
 
-/// On which side of a plane each corner is: a distance, or 0 within the tolerance. `None` if the triangle
-/// does not reach the plane, or lies in it.
-fn sides(corners: &[DVec3; 3], point: DVec3, normal: DVec3, tolerance: f64) -> Option<[f64; 3]> {
+/// Whether two triangles are one surface that goes on over a part of an edge.
+fn abut(shown: &Shown, a: u32, b: u32) -> bool {
+    let solid = &shown.solids[shown.solid_of(a)];
+    let abutting = &solid.topology.abutting;
+    let (first, end) = (solid.first_triangle, solid.first_triangle + solid.triangle_count);
+    !abutting.is_empty()
+        && (first..end).contains(&b)
+        && abutting.contains(&ordered(shown.origin(solid, a), shown.origin(solid, b)))
+}
+
+/// On which side of another triangle's plane each corner is: a distance, or 0 within the tolerance. `None` if
+/// the triangle does not reach the plane, or lies in it.
+fn sides(shown: &Shown, corners: &[DVec3; 3], plane: &[DVec3; 3], normal: DVec3) -> Option<[f64; 3]> {
+    let of_plane = shown.lens.rounding_of_plane(normal, plane).min(shown.lens.tolerance);
     let sides = corners.map(|c| {
-        let side = normal.dot(c - point);
-        if side.abs() <= tolerance { 0.0 } else { side }
+        let side = normal.dot(c - plane[0]);
+        if side.abs() <= of_plane.max(shown.lens.rounding_of_point(c)) { 0.0 } else { side }
     });
     let reaches = sides.iter().any(|&s| s >= 0.0) && sides.iter().any(|&s| s <= 0.0);
     let lies_in = sides.iter().all(|&s| s == 0.0);
@@ -283,7 +300,7 @@ fn passes_through(shown: &Shown, t: u32, sides: &[f64; 3], point: DVec3, normal:
     }
     let edge = [0, 1].map(|i| shown.triangles[t as usize][(k + i) % 3]);
     let other = shown.triangles[neighbour as usize].iter().find(|v| !edge.contains(v));
-    let theirs = other.map_or(0.0, |&v| normal.dot(shown.in_view[v as usize] - point));
-    let ours = sides[(k + 2) % 3];
-    theirs * ours < 0.0 && theirs.abs() > shown.lens.tolerance
+    let Some(other) = other.map(|&v| shown.in_view[v as usize]) else { return false };
+    let (theirs, ours) = (normal.dot(other - point), sides[(k + 2) % 3]);
+    theirs * ours < 0.0 && theirs.abs() > shown.lens.rounding_of_point(other)
 }

@@ -7,8 +7,8 @@
 //! 1. `shown`: instances that may be seen are clipped and projected, nearest first; `cover` notes for each
 //!    cell of a grid how far one can see there, and whole instances and triangles beyond that are left out;
 //!    so are the backs of `bodies`.
-//! 2. `edges`: the edges to draw are chosen by their kind in this view. `intersections` adds the lines in
-//!    which surfaces meet.
+//! 2. `edges`: the edges to draw are chosen by their kind in this view; `junctions` has joined those that meet
+//!    part of the way. `intersections` adds the lines in which surfaces meet.
 //! 3. `trace`: each line is followed through the grid; `hide` finds the exact part that one triangle hides.
 //!    Signs that decide are exact ([Shewchuk 1997]); end points are crossings of lines, never samples.
 //! 4. `coincident` draws once what lies on one another; `strokes` joins the rest into few long strokes.
@@ -16,11 +16,12 @@
 //!    of them shows. `caps` closes what section planes open.
 //!
 //! What counts: a surface hides what is farther along the line of sight, whichever of its sides is seen.
-//! What is nearer to a surface than the *tolerance*, a few units in the last place of a coordinate in `f32`,
-//! lies in it and is not hidden by it; so bodies that touch show their lines. An edge is never hidden by the
-//! triangles that it is an edge of.
+//! What is nearer to a surface than the *tolerance*, a few units in the last place of a coordinate in `f32` at
+//! that place, lies in it and is not hidden by it; so bodies that touch show their lines. An edge is never hidden
+//! by the triangles that it is an edge of.
 //!
-//! Not done: surfaces with holes by a mask are drawn solid.
+//! Textures are not looked at: a surface is there where its material, without its texture, is not wholly
+//! transparent, or below the cutoff of its mask. Holes that a texture makes are drawn solid.
 
 mod arrangement;
 mod bodies;
@@ -36,6 +37,7 @@ mod grid;
 mod hatch;
 mod hide;
 mod intersections;
+mod junctions;
 mod lens;
 mod occluders;
 mod predicates;
@@ -73,7 +75,8 @@ pub struct Kinds {
     pub intersection: bool,
     /// Where an edge of one surface lies on another surface that goes on beyond it.
     pub contact: bool,
-    /// Edges that [`PrepareOptions::marked`] names.
+    /// Lines of the model ([`Mesh::lines`](crate::scene::Mesh::lines)), and edges that
+    /// [`PrepareOptions::marked`] names.
     pub marked: bool,
 }
 
@@ -109,7 +112,7 @@ impl Default for Kinds {
 /// What may be chosen about a preparation.
 #[derive(Clone, Debug, Default)]
 pub struct PrepareOptions {
-    /// Edges to draw whatever they are: a mesh and two of its vertices.
+    /// Edges to draw whatever they are, besides the lines of the model: a mesh and two of its vertices.
     pub marked: Vec<(u32, [u32; 2])>,
 }
 
@@ -189,7 +192,7 @@ impl Preparation {
         };
         let meshes =
             scene.meshes.iter().enumerate().map(|(i, m)| Topology::of(scene, m, &marked(i))).collect();
-        let bounds = scene.meshes.iter().map(|m| m.bounds()).collect();
+        let bounds = scene.meshes.iter().map(|m| m.bounds().union(&m.bounds_of_lines())).collect();
         let mut preparation = Preparation { meshes, bounds, instances: Vec::new(), tolerance: 0.0 };
         preparation.pose(scene);
         preparation
@@ -202,7 +205,8 @@ impl Preparation {
         self.tolerance = reach * ROUNDING;
     }
 
-    /// What is nearer to each other than this, metres, is taken to be at the same place.
+    /// The largest distance, metres, at which things are taken to be at the same place: that where the scene's
+    /// coordinates are largest. Elsewhere it is as much smaller as the coordinates there are.
     pub fn tolerance(&self) -> f64 {
         self.tolerance
     }

@@ -8,7 +8,7 @@ use super::bodies::{Body, Paper};
 use super::crew::Crew;
 use super::lens::{HalfSpace, Lens};
 use super::predicates::orientation;
-use super::topology::{Mix, NONE, Topology};
+use super::topology::{Mix, NONE, Topology, trait_of};
 use glam::{DAffine3, DVec3, Vec3};
 use std::collections::HashMap;
 
@@ -35,6 +35,7 @@ pub(super) struct Solid<'p> {
     pub part: u32,
     /// Whether the instance keeps angles.
     pub keeps_angles: bool,
+    pub view_from_mesh: DAffine3,
     pub first_vertex: u32,
     pub first_triangle: u32,
     pub triangle_count: u32,
@@ -92,6 +93,8 @@ pub(super) struct Cap {
 pub(super) struct SectionLine {
     pub solid: u32,
     pub plane: u32,
+    /// The mesh's triangle that is cut here; [`NONE`] where planes cut each other.
+    pub triangle: u32,
     pub vertices: [u32; 2],
 }
 
@@ -141,6 +144,7 @@ impl<'p> Shown<'p> {
             topology,
             part,
             keeps_angles: keeps_angles(view_from_mesh),
+            view_from_mesh: *view_from_mesh,
             first_vertex,
             first_triangle,
             triangle_count: self.triangles.len() as u32 - first_triangle,
@@ -200,7 +204,8 @@ impl<'p> Shown<'p> {
             let mut polygon: Vec<u32> = t.to_vec();
             if !whole {
                 for (k, plane) in planes.iter().enumerate() {
-                    polygon = self.clip_polygon(&mut cut, first_vertex, &polygon, plane, k as u32);
+                    let of = [k as u32, i as u32];
+                    polygon = self.clip_polygon(&mut cut, first_vertex, &polygon, plane, of);
                 }
             }
             if polygon.len() >= 3 {
@@ -211,6 +216,9 @@ impl<'p> Shown<'p> {
                     cut.origin.push(i as u32);
                 }
             }
+        }
+        for edge in topology.edges.iter().filter(|e| e.traits & trait_of::LOOSE != 0) {
+            self.clip_loose(&mut cut, first_vertex, edge.vertices, &planes);
         }
         // Vertices that are cut away stay in the list, unused; project() must not see them behind the eye.
         for (v, &kept) in cut.kept.iter().enumerate() {
@@ -229,7 +237,7 @@ impl<'p> Shown<'p> {
         first: u32,
         polygon: &[u32],
         plane: &HalfSpace,
-        number: u32,
+        [number, triangle]: [u32; 2],
     ) -> Vec<u32> {
         let mut result = Vec::with_capacity(polygon.len() + 1);
         let mut on_plane = Vec::new();
@@ -254,12 +262,31 @@ impl<'p> Shown<'p> {
                 on_plane.push(v);
             }
         }
-        if outside && on_plane.len() == 2 {
+        // What sections cut, `caps` finds.
+        if outside && !plane.section && on_plane.len() == 2 {
             let vertices = [on_plane[0] + first, on_plane[1] + first];
             let solid = self.solids.len() as u32;
-            self.sections.push(SectionLine { solid, plane: number, vertices });
+            self.sections.push(SectionLine { solid, plane: number, triangle, vertices });
         }
         result
+    }
+
+    /// Cuts an edge that no triangle has.
+    fn clip_loose(&mut self, cut: &mut Cut, first: u32, mut ends: [u32; 2], planes: &[HalfSpace]) {
+        for plane in planes {
+            let sides = ends.map(|v| plane.side(self.in_view[(v + first) as usize]));
+            let crossing = sides[0] * sides[1] < 0.0;
+            let new = crossing.then(|| self.crossing(cut, first, ends[0], ends[1], plane));
+            for k in 0..2 {
+                if sides[k] < 0.0 {
+                    cut.kept[ends[k] as usize] = false;
+                    ends[k] = new.unwrap_or(ends[k]);
+                }
+            }
+            if new.is_none() && sides.iter().any(|&s| s < 0.0) {
+                return;
+            }
+        }
     }
 
     /// The vertex where a plane cuts the edge between two vertices; the same for all that share it.
@@ -377,6 +404,26 @@ impl<'p> Shown<'p> {
             NONE => None,
             body => Some(solid.first_body + body).filter(|&sheet| self.sheets[sheet as usize]),
         }
+    }
+
+    /// How opaque a triangle is, 0 to 1; a cap wholly.
+    pub fn opacity_of(&self, triangle: u32) -> f32 {
+        if self.cap(triangle).is_some() {
+            return 1.0;
+        }
+        let solid = &self.solids[self.solid_of(triangle)];
+        let opacity = &solid.topology.opacity;
+        if opacity.is_empty() { 1.0 } else { opacity[self.origin(solid, triangle) as usize] }
+    }
+
+    /// Whether a triangle's material blends; of a cap not.
+    pub fn blends(&self, triangle: u32) -> bool {
+        if self.cap(triangle).is_some() {
+            return false;
+        }
+        let solid = &self.solids[self.solid_of(triangle)];
+        let blends = &solid.topology.see_through;
+        !blends.is_empty() && blends[self.origin(solid, triangle) as usize]
     }
 
     /// A triangle's corners on the paper.

@@ -1,6 +1,8 @@
 //! Whole drawings against dense sampling by rays, and what must not change a drawing.
 
 mod bodies;
+mod cuts;
+mod junctions;
 mod scenes;
 
 use super::{Drawing, Kinds, LineOptions, Preparation, PrepareOptions};
@@ -299,9 +301,19 @@ fn judge_faces(name: &str, scene: &Scene, view: &View) -> (usize, usize) {
                 unsure += 1;
                 continue;
             };
-            let parts: Vec<u32> = faces_at(&drawing, p).iter().map(|f| f.part).collect();
-            let expected: Vec<u32> = seen.into_iter().collect();
+            let found = faces_at(&drawing, p);
+            let parts: Vec<u32> = found.iter().map(|f| f.part).collect();
+            let expected: Vec<u32> = seen.iter().map(|s| s.0).collect();
             assert_eq!(parts, expected, "{name} at {p}");
+            if let (Some(face), Some((part, triangles))) = (found.first(), &seen) {
+                let same =
+                    |t: &u32| oracle.in_one_plane(*part, [*t, face.triangle], 4.0 * super::edges::FLAT);
+                assert!(
+                    triangles.iter().any(same),
+                    "{name} at {p}: {} is not of {triangles:?}",
+                    face.triangle
+                );
+            }
             right += 1;
         }
     }
@@ -310,7 +322,10 @@ fn judge_faces(name: &str, scene: &Scene, view: &View) -> (usize, usize) {
     let sum: f64 = drawing.faces.iter().map(super::Face::area).sum();
     let together: f64 = super::arrangement::merged(&all)
         .iter()
-        .map(|p| super::Face { part: 0, triangle: 0, cut: false, color: [0; 3], contours: p.clone() }.area())
+        .map(|p| {
+            let (through, color, contours) = (Vec::new(), [0; 3], p.clone());
+            super::Face { part: 0, through, triangle: 0, cut: false, color, opacity: 1.0, contours }.area()
+        })
         .sum();
     assert!((sum - together).abs() <= 1e-9 * sum.max(1.0), "{name}: {sum} and {together}");
     (right, unsure)
@@ -341,6 +356,46 @@ fn faces_are_what_rays_see_and_tile() {
         unsure += u;
     }
     assert!(unsure * 100 < right, "{unsure} unsure, {right} right");
+}
+
+#[test]
+fn the_faces_of_a_convex_body_are_as_large_as_its_outline() {
+    let (positions, triangles) = scenes::cuboid([0.0; 3], [1.0, 0.7, 1.3]);
+    let mut scene = Scene::new("box");
+    scenes::add(&mut scene, "box", positions.clone(), triangles, crate::scene::Transform::default());
+    let mut judged = 0;
+    for view in scenes::views(&scene) {
+        let preparation = Preparation::new(&scene, &PrepareOptions::default());
+        let options = LineOptions { faces: Some(super::FaceColor::White), ..all_lines() };
+        let drawing = preparation.draw(&view, &options).unwrap();
+        let oracle = LineOracle::new(&scene, &view, preparation.tolerance());
+        let on_paper = |p: &glam::Vec3| oracle.on_paper(view.view_from_world.transform_point3(p.as_dvec3()));
+        // The hull by its definition: sides with all points to their left.
+        let mut points: Vec<DVec2> = Vec::new();
+        for p in positions.iter().map(on_paper) {
+            if points.iter().all(|q| q.distance(p) > 1e-6) {
+                points.push(p);
+            }
+        }
+        let size = DVec2::new(drawing.width, drawing.height);
+        if points.iter().any(|p| p.cmplt(DVec2::ZERO).any() || p.cmpgt(size).any()) {
+            continue;
+        }
+        judged += 1;
+        let mut twice = 0.0;
+        for a in &points {
+            for b in points.iter().filter(|b| *b != a) {
+                let side = |p: &DVec2| (*b - *a).perp_dot(*p - *a);
+                let ends = |p: &DVec2| (*p - *a).dot(*p - *b) <= 0.0;
+                if points.iter().all(|p| side(p) > 1e-9 || (side(p).abs() <= 1e-9 && ends(p))) {
+                    twice += a.perp_dot(*b);
+                }
+            }
+        }
+        let sum: f64 = drawing.faces.iter().map(super::Face::area).sum();
+        assert!((sum - twice * 0.5).abs() < 1e-9 * sum, "{sum} {}", twice * 0.5);
+    }
+    assert!(judged >= 3);
 }
 
 #[test]

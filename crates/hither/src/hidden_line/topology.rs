@@ -1,13 +1,14 @@
 //! What does not change with the view: a mesh's edges, and which triangles meet at each.
 //!
 //! Vertices with the same position are one vertex here, whatever their normals and colours, so that a seam
-//! of texture coordinates is no boundary. Triangles without area are left out: they show nothing and hide
-//! nothing.
+//! of texture coordinates is no boundary. Triangles without area are left out, and those that are wholly
+//! transparent: they show nothing and hide nothing.
 
 use super::bodies::Bodies;
+use super::junctions;
 use crate::scene::{AlphaMode, Mesh, Scene};
 use glam::{DVec3, Vec3};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// No triangle, or no vertex.
 pub(super) const NONE: u32 = u32::MAX;
@@ -20,8 +21,10 @@ pub(super) mod trait_of {
     pub const BORDER: u8 = 2;
     /// The two triangles wind in opposite senses: what is front of one is back of the other.
     pub const FLIPPED: u8 = 4;
-    /// The user asked for it.
+    /// The model draws a line here, or the user asked for one.
     pub const MARKED: u8 = 8;
+    /// No triangle has it as a whole edge: planes must cut it by itself.
+    pub const LOOSE: u8 = 16;
 }
 
 /// Two vertices and the triangles between them.
@@ -29,7 +32,8 @@ pub(super) mod trait_of {
 pub(super) struct Edge {
     /// The smaller vertex first.
     pub vertices: [u32; 2],
-    /// The triangles on both sides; the second is [`NONE`] at a boundary. Of a non-manifold edge, two.
+    /// The triangles on both sides; the second is [`NONE`] at a boundary, both of a line without triangles.
+    /// Of a non-manifold edge, two.
     pub triangles: [u32; 2],
     /// How much the surface bends here, 1 − cos of the angle between the normals, in the mesh's own space:
     /// 0 is flat, 2 is folded back.
@@ -44,7 +48,7 @@ pub(super) struct Topology {
     /// Vertices; no two are the same point.
     pub positions: Vec<Vec3>,
     /// Corners of each of the mesh's triangles, numbered as the mesh numbers them; [`NONE`] thrice for one
-    /// without area.
+    /// that shows nothing.
     pub triangles: Vec<[u32; 3]>,
     /// The triangle across the edge from corner k to k + 1; [`NONE`] at a boundary or non-manifold edge.
     pub neighbours: Vec<[u32; 3]>,
@@ -54,8 +58,12 @@ pub(super) struct Topology {
     pub edges: Vec<Edge>,
     /// Closed bodies among the triangles.
     pub bodies: Bodies,
+    /// Triangles, the smaller first, that meet along a part of an edge and go on as one surface.
+    pub abutting: HashSet<[u32; 2], Mix>,
     /// Triangles that hide nothing if blended materials do not; empty where there are none.
     pub see_through: Vec<bool>,
+    /// Opacity of each triangle; empty where no material blends.
+    pub opacity: Vec<f32>,
     /// Ends of the runs of triangles with one material, and its colour, linear.
     colors: Vec<(u32, Vec3)>,
     /// A factor for each triangle; empty where there are none.
@@ -70,8 +78,13 @@ impl Topology {
         let corner = |v: u32| name.as_ref().map_or(v, |n| n[v as usize]);
         let mut triangles = Vec::with_capacity(mesh.triangles.len());
         let mut normals = Vec::with_capacity(mesh.triangles.len());
-        for t in &mesh.triangles {
-            let (t, normal) = solid(t.map(corner), &positions);
+        let alphas = alphas(scene, mesh);
+        let clear = clear(&alphas);
+        for (i, t) in mesh.triangles.iter().enumerate() {
+            let (mut t, normal) = solid(t.map(corner), &positions);
+            if clear.get(i).is_some_and(|&clear| clear) {
+                t = [NONE; 3];
+            }
             triangles.push(t);
             normals.push(normal);
         }
@@ -80,7 +93,9 @@ impl Topology {
             flips: vec![0; triangles.len()],
             edges: Vec::new(),
             bodies: Bodies::default(),
-            see_through: see_through(scene, mesh),
+            abutting: HashSet::default(),
+            see_through: see_through(&alphas),
+            opacity: opacity(&alphas),
             colors: colors(scene, mesh),
             tints: tints(mesh),
             positions,
@@ -96,13 +111,9 @@ impl Topology {
         }
         topology.bodies =
             Bodies::find(&topology.positions, &topology.triangles, &topology.neighbours, &topology.flips);
-        if !marked.is_empty() {
-            let wanted: std::collections::HashSet<[u32; 2]> =
-                marked.iter().map(|&[a, b]| ordered(corner(a), corner(b))).collect();
-            for edge in topology.edges.iter_mut().filter(|e| wanted.contains(&e.vertices)) {
-                edge.traits |= trait_of::MARKED;
-            }
-        }
+        junctions::mend(&mut topology, &normals, &materials);
+        let marked: Vec<[u32; 2]> = marked.iter().map(|&[a, b]| [corner(a), corner(b)]).collect();
+        topology.mark(&marked, &mesh.lines);
         topology
     }
 
@@ -146,6 +157,44 @@ impl Topology {
                 rest = others;
             }
         }
+    }
+
+    /// Marks edges: those between pairs of vertices, and those that lines run along. Other lines become edges
+    /// without triangles.
+    fn mark(&mut self, pairs: &[[u32; 2]], lines: &[[Vec3; 2]]) {
+        if pairs.is_empty() && lines.is_empty() {
+            return;
+        }
+        let mut wanted: HashSet<[u32; 2], Mix> = pairs.iter().map(|&[a, b]| ordered(a, b)).collect();
+        let mut free: Vec<[u32; 2]> = Vec::new();
+        if !lines.is_empty() {
+            let mut numbers: HashMap<[u32; 3], u32, Mix> =
+                self.positions.iter().enumerate().map(|(i, p)| (key(p), i as u32)).collect();
+            for line in lines {
+                let [a, b] = line.map(|p| {
+                    *numbers.entry(key(&p)).or_insert_with(|| {
+                        self.positions.push(p + 0.0);
+                        self.positions.len() as u32 - 1
+                    })
+                });
+                if a != b && wanted.insert(ordered(a, b)) {
+                    free.push(ordered(a, b));
+                }
+            }
+        }
+        let mut found: HashSet<[u32; 2], Mix> = HashSet::default();
+        for edge in self.edges.iter_mut().filter(|e| wanted.contains(&e.vertices)) {
+            edge.traits |= trait_of::MARKED;
+            found.insert(edge.vertices);
+        }
+        let loose = trait_of::MARKED | trait_of::LOOSE;
+        let without = free.into_iter().filter(|v| !found.contains(v));
+        self.edges.extend(without.map(|vertices| Edge {
+            vertices,
+            triangles: [NONE; 2],
+            bend: 2.0,
+            traits: loose,
+        }));
     }
 
     /// Takes out triangles that have the same corners as another; whether there were any. Only where more
@@ -197,7 +246,7 @@ impl Topology {
     }
 }
 
-fn ordered(a: u32, b: u32) -> [u32; 2] {
+pub(super) fn ordered(a: u32, b: u32) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
@@ -211,9 +260,13 @@ fn solid(t: [u32; 3], positions: &[Vec3]) -> ([u32; 3], Vec3) {
     (t, normal.normalize_or_zero().as_vec3())
 }
 
+/// Equal for equal positions; zero has one sign.
+fn key(p: &Vec3) -> [u32; 3] {
+    (*p + 0.0).to_array().map(f32::to_bits)
+}
+
 /// Distinct positions, and for each vertex its position's number; `None` where all are distinct.
 fn weld(positions: &[Vec3]) -> (Vec<Vec3>, Option<Vec<u32>>) {
-    let key = |p: &Vec3| (*p + 0.0).to_array().map(f32::to_bits);
     // Sorting what is distinct anyway would cost more than drawing it: look for twins in a table of
     // fingerprints first.
     let mut seen: HashMap<[u32; 3], u32, Mix> = HashMap::with_capacity_and_hasher(positions.len(), Mix);
@@ -292,12 +345,48 @@ fn tints(mesh: &Mesh) -> Vec<Vec3> {
     mesh.triangles.iter().map(mean).collect()
 }
 
-fn see_through(scene: &Scene, mesh: &Mesh) -> Vec<bool> {
-    let blended = |m: Option<u32>| m.is_some_and(|m| scene.materials[m as usize].alpha == AlphaMode::Blend);
-    if !mesh.primitives.iter().any(|p| blended(p.material)) {
+/// Mean alpha of each triangle, without its texture; empty where all materials are opaque.
+fn alphas(scene: &Scene, mesh: &Mesh) -> Vec<(AlphaMode, f32)> {
+    let material = |m: Option<u32>| m.map(|m| &scene.materials[m as usize]);
+    let is_opaque = |m: Option<u32>| material(m).is_none_or(|m| m.alpha == AlphaMode::Opaque);
+    if mesh.primitives.iter().all(|p| is_opaque(p.material)) {
         return Vec::new();
     }
-    mesh.primitives.iter().flat_map(|p| p.triangles.clone().map(|_| blended(p.material))).collect()
+    let tint = |t: u32| match mesh.colors.is_empty() {
+        true => 1.0,
+        false => mesh.triangles[t as usize].iter().map(|&v| mesh.colors[v as usize].w).sum::<f32>() / 3.0,
+    };
+    let of_run = |p: &crate::scene::Primitive| {
+        let (mode, alpha) =
+            material(p.material).map_or((AlphaMode::Opaque, 1.0), |m| (m.alpha, m.base_color.w));
+        p.triangles.clone().map(move |t| (mode, alpha * tint(t)))
+    };
+    mesh.primitives.iter().flat_map(of_run).collect()
+}
+
+fn see_through(alphas: &[(AlphaMode, f32)]) -> Vec<bool> {
+    let blends = alphas.iter().map(|a| a.0 == AlphaMode::Blend);
+    if blends.clone().any(|b| b) { blends.collect() } else { Vec::new() }
+}
+
+fn opacity(alphas: &[(AlphaMode, f32)]) -> Vec<f32> {
+    if alphas.iter().all(|a| a.0 != AlphaMode::Blend) {
+        return Vec::new();
+    }
+    let opacity = |a: &(AlphaMode, f32)| if a.0 == AlphaMode::Blend { a.1.clamp(0.0, 1.0) } else { 1.0 };
+    alphas.iter().map(opacity).collect()
+}
+
+/// Triangles of which nothing shows, whatever their texture: wholly transparent, or below the cutoff of their
+/// mask; empty where there are none.
+fn clear(alphas: &[(AlphaMode, f32)]) -> Vec<bool> {
+    let clear = |&(mode, alpha): &(AlphaMode, f32)| match mode {
+        AlphaMode::Opaque => false,
+        AlphaMode::Mask { cutoff } => alpha < cutoff,
+        AlphaMode::Blend => alpha <= 0.0,
+    };
+    let all: Vec<bool> = alphas.iter().map(clear).collect();
+    if all.contains(&true) { all } else { Vec::new() }
 }
 
 #[cfg(test)]

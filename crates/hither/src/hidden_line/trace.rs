@@ -27,6 +27,10 @@ pub(super) struct Part {
 pub(super) struct Tracer<'a> {
     pub shown: &'a Shown<'a>,
     pub occluders: &'a Occluders,
+    /// All surfaces, also those that hide nothing.
+    pub surfaces: &'a Occluders,
+    /// Whether blended surfaces hide nothing, and there are any.
+    pub sees_through: bool,
     /// What is known to be hidden; `None` where layers are to be counted.
     pub cover: Option<&'a Cover>,
     pub picture: DVec2,
@@ -60,6 +64,11 @@ impl Scratch {
 }
 
 impl Tracer<'_> {
+    /// Whether a triangle hides what is behind it.
+    pub fn hides(&self, triangle: u32) -> bool {
+        !self.sees_through || !self.shown.blends(triangle)
+    }
+
     /// Finds the parts of the line from `p` to `q` that are inside the picture, in order, into
     /// `scratch.parts`.
     pub fn trace(&self, [p, q]: [DVec3; 2], own: &Own<impl Fn(u32) -> bool>, scratch: &mut Scratch) {

@@ -22,6 +22,9 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Consecutive, non-overlapping runs of `triangles`, together all of them, in order.
     pub primitives: Vec<Primitive>,
+    /// Lines that the model has besides its faces, as segments, all finite. They are marked for line drawings;
+    /// in pictures they do not show.
+    pub lines: Vec<[Vec3; 2]>,
 }
 
 /// A run of triangles with one material.
@@ -44,6 +47,14 @@ impl Mesh {
         Aabb { min: b.0.as_dvec3(), max: b.1.as_dvec3() }
     }
 
+    /// The smallest box around the ends of its lines; empty if there are none.
+    pub fn bounds_of_lines(&self) -> Aabb {
+        let ends = || self.lines.as_flattened().iter();
+        let min = ends().fold(Vec3::INFINITY, |m, p| m.min(*p));
+        let max = ends().fold(Vec3::NEG_INFINITY, |m, p| m.max(*p));
+        Aabb { min: min.as_dvec3(), max: max.as_dvec3() }
+    }
+
     /// The material of triangle `index`. Cost: logarithmic in the number of primitives.
     pub fn material_of(&self, index: u32) -> Option<u32> {
         let at = self.primitives.partition_point(|p| p.triangles.end <= index);
@@ -63,6 +74,9 @@ pub(super) fn validate(scene: &Scene) -> Result<(), SceneError> {
         }
         if mesh.triangles.as_flattened().iter().any(|&v| v as usize >= n) {
             return wrong("a triangle names a vertex that does not exist");
+        }
+        if mesh.lines.as_flattened().iter().any(|p| !p.is_finite()) {
+            return wrong("an end of a line is not a finite number");
         }
         let mut next = 0;
         for p in &mesh.primitives {

@@ -103,9 +103,9 @@ impl Scene {
         totals
     }
 
-    /// Bounds of everything shown, in world space; `None` for an empty scene.
+    /// Bounds of everything shown, lines included, in world space; `None` for an empty scene.
     pub fn bounds(&self) -> Option<Aabb> {
-        let meshes: Vec<Aabb> = self.meshes.iter().map(Mesh::bounds).collect();
+        let meshes: Vec<Aabb> = self.meshes.iter().map(|m| m.bounds().union(&m.bounds_of_lines())).collect();
         let mut groups: Vec<Aabb> = Vec::with_capacity(self.groups.len());
         for group in &self.groups {
             let world = group.world_transforms();

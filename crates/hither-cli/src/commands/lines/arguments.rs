@@ -16,7 +16,8 @@ pub struct Arguments {
     /// the drawing's number; without one, out.svg becomes out.0001.svg
     #[arg(short, value_name = "FILE", required_unless_present = "json")]
     pub output: Option<PathBuf>,
-    /// Which lines: silhouette, crease, boundary, border, intersection, contact; or all, or none
+    /// Which lines: silhouette, crease, boundary, border, intersection, contact, marked (the model's own lines);
+    /// or all, or none
     #[arg(long, value_name = "LIST", value_parser = kinds, default_value = "all", help_heading = "Lines")]
     pub edges: Kinds,
     /// From which angle between neighbouring faces on their edge is a crease, in degrees; at 0 every edge is
@@ -151,8 +152,9 @@ fn kinds(text: &str) -> Result<Kinds, String> {
             "border" => kinds.border = true,
             "intersection" => kinds.intersection = true,
             "contact" => kinds.contact = true,
+            "marked" => kinds.marked = true,
             _ => {
-                let known = "silhouette, crease, boundary, border, intersection, contact, all, none";
+                let known = "silhouette, crease, boundary, border, intersection, contact, marked, all, none";
                 return Err(format!("there are no lines \"{name}\"; there are {known}"));
             }
         }
@@ -166,7 +168,8 @@ fn crease(text: &str) -> Result<f64, String> {
 }
 
 fn spacing(text: &str) -> Result<f64, String> {
-    options::number(text).filter(|&s| s > 0.0).ok_or_else(|| "write a distance above 0".into())
+    // Closer lines than this would fill the paper, and the memory.
+    options::number(text).filter(|&s| s >= 0.05).ok_or_else(|| "write a distance of 0.05 or more".into())
 }
 
 /// How many metres of the scene a metre of paper shows.
@@ -223,5 +226,6 @@ mod tests {
         assert!(["w=1", "y=", "1,2,3", "0,0,0,1", ""].iter().all(|t| section(t).is_err()));
         assert!(views("front, top").is_ok() && views("front,side").is_err());
         assert!(kinds("crease,silhouette").unwrap().crease && kinds("edges").is_err());
+        assert_eq!(kinds("marked"), Ok(Kinds { marked: true, ..Kinds::NONE }));
     }
 }

@@ -57,7 +57,34 @@ fn strips_and_fans_and_what_is_left_out() {
     assert_eq!(corners(&scene.meshes[1]), [[a, b, c], [a, c, d]]);
     // A mesh of lines still is an instance, so that the others keep their numbers.
     assert_eq!(scene.instance_count(), 6);
-    assert_eq!(odd, ["mesh 2 \"thin\" and 3 more: its points and lines are left out"]);
+    assert_eq!(odd, ["mesh 2 \"thin\": its points are left out"]);
+    let lines = |i: usize| scene.meshes[i].lines.clone();
+    assert!(lines(2).is_empty());
+    assert_eq!(lines(3), [[a, b], [c, d]]);
+    assert_eq!(lines(4), [[a, b], [b, c], [c, d], [d, a]]);
+    assert_eq!(lines(5), [[a, b], [b, c], [c, d]]);
+}
+
+#[test]
+fn lines_take_their_corners_from_indices() {
+    let mut build = Build::new();
+    let [a, b, c, d] = SQUARE;
+    let corners = build.floats(&[a, [f32::NAN; 3], b, c, d]);
+    let indices = build.shorts(&[2, 4, 4, 4, 2, 3, 1, 2]);
+    let faces = build.shorts(&[0, 2, 3]);
+    build.show(
+        "lined",
+        json!([{ "attributes": { "POSITION": corners }, "indices": faces },
+               { "attributes": { "POSITION": corners }, "indices": indices, "mode": 1 }]),
+    );
+    let (scene, odd) = build.odd_scene();
+    let [_, b, c, d] = SQUARE.map(Vec3::from_array);
+    assert_eq!(scene.meshes[0].lines, [[b, d], [b, c]]);
+    assert_eq!(scene.meshes[0].triangles.len(), 1);
+    assert!(odd.iter().any(|o| o.contains("has lines that touch a position")), "{odd:?}");
+    let outside = build.shorts(&[0, 9]);
+    build.show("outside", json!([{ "attributes": { "POSITION": corners }, "indices": outside, "mode": 1 }]));
+    assert!(build.refusal().contains("index 1 is 9, but there are 5 vertices"));
 }
 
 #[test]

@@ -54,6 +54,7 @@ fn mesh(name: &str, full: bool) -> Mesh {
             Primitive { triangles: 0..1, material: full.then_some(0) },
             Primitive { triangles: 1..3, material: full.then_some(1) },
         ],
+        lines: if full { vec![[Vec3::ZERO, Vec3::Y], [Vec3::X, Vec3::splat(third)]] } else { vec![] },
     }
 }
 

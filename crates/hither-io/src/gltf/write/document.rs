@@ -79,9 +79,13 @@ pub(super) struct MeshEntry<'a> {
 #[derive(Serialize)]
 pub(super) struct PrimitiveEntry {
     pub(super) attributes: Attributes,
-    pub(super) indices: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) indices: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) material: Option<u32>,
+    /// What corners make; triangles if it is not said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) mode: Option<u32>,
 }
 
 #[derive(Clone, Copy, Serialize)]

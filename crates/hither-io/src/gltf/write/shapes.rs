@@ -7,7 +7,7 @@ use super::looks::Looks;
 use glam::Vec3;
 use hither::scene::{CameraProjection, Mesh, Scene};
 
-/// The meshes that are shown and have triangles, and which of the scene's became which.
+/// The meshes that are shown and have triangles or lines, and which of the scene's became which.
 pub(super) fn meshes<'a>(
     scene: &'a Scene,
     expanded: &Expanded,
@@ -21,7 +21,7 @@ pub(super) fn meshes<'a>(
         .iter()
         .zip(shown)
         .map(|(mesh, shown)| {
-            if !shown || mesh.triangles.is_empty() {
+            if !shown || (mesh.triangles.is_empty() && mesh.lines.is_empty()) {
                 return None;
             }
             entries.push(entry(mesh, looks, binary));
@@ -31,8 +31,23 @@ pub(super) fn meshes<'a>(
     (entries, index)
 }
 
-/// A mesh whose primitives share their vertices.
 fn entry<'a>(mesh: &'a Mesh, looks: &mut Looks, binary: &mut Binary) -> MeshEntry<'a> {
+    let mut primitives = match mesh.triangles.is_empty() {
+        true => Vec::new(),
+        false => faces(mesh, looks, binary),
+    };
+    if !mesh.lines.is_empty() {
+        const LINES: u32 = 1;
+        let ends = mesh.lines.as_flattened().iter().map(Vec3::to_array);
+        let position = binary.floats(ends, Purpose::Bounded(Use::Vertices));
+        let attributes = Attributes { position, normal: None, uv: None, color: None };
+        primitives.push(PrimitiveEntry { attributes, indices: None, material: None, mode: Some(LINES) });
+    }
+    MeshEntry { name: &mesh.name, primitives }
+}
+
+/// Primitives of triangles, which share their vertices.
+fn faces(mesh: &Mesh, looks: &mut Looks, binary: &mut Binary) -> Vec<PrimitiveEntry> {
     let positions = mesh.positions.iter().map(Vec3::to_array);
     let position = binary.floats(positions, Purpose::Bounded(Use::Vertices));
     let unit = |n: &Vec3| match (n.length_squared() - 1.0).abs() <= 1e-6 {
@@ -49,17 +64,20 @@ fn entry<'a>(mesh: &'a Mesh, looks: &mut Looks, binary: &mut Binary) -> MeshEntr
     if !mesh.colors.is_empty() {
         attributes.color = Some(binary.floats(mesh.colors.iter().map(|c| c.to_array()), Purpose::Attribute));
     }
-    let primitives = mesh
-        .primitives
+    mesh.primitives
         .iter()
         .filter(|p| !p.triangles.is_empty())
         .map(|p| {
             let triangles = &mesh.triangles[p.triangles.start as usize..p.triangles.end as usize];
-            let indices = binary.indices(triangles, mesh.positions.len());
-            PrimitiveEntry { attributes, indices, material: p.material.map(|m| looks.material(m)) }
+            let indices = Some(binary.indices(triangles, mesh.positions.len()));
+            PrimitiveEntry {
+                attributes,
+                indices,
+                material: p.material.map(|m| looks.material(m)),
+                mode: None,
+            }
         })
-        .collect();
-    MeshEntry { name: &mesh.name, primitives }
+        .collect()
 }
 
 /// All cameras, hung where they belong.

@@ -24,7 +24,7 @@ pub fn add_box(scene: &mut Scene, name: &str, min: [f32; 3], max: [f32; 3]) {
 }
 
 /// A ball of triangles.
-fn ball(scene: &mut Scene, name: &str, center: DVec3, radius: f64, rows: u32) {
+pub fn ball(scene: &mut Scene, name: &str, center: DVec3, radius: f64, rows: u32) {
     let columns = rows * 2;
     let mut positions = Vec::new();
     for i in 0..=rows {
