@@ -325,11 +325,13 @@ fn with_coverage_only_what_is_approximated_differs_and_is_counted() {
 #[test]
 fn parts_that_pass_through_each_other_are_kept_apart_by_holding_out() {
     let (mut scene, mut view) = strewn(0, true);
-    let mut pane = Mesh::default();
-    pane.positions =
-        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
-    pane.triangles = vec![[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]];
-    pane.primitives = vec![Primitive { triangles: 0..4, material: None }];
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let pane = Mesh {
+        positions: corners.map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]],
+        primitives: vec![Primitive { triangles: 0..4, material: None }],
+        ..Mesh::default()
+    };
     scene.meshes = vec![pane];
     let node = |angle: f64, x: f64| {
         let local = DAffine3::from_translation(DVec3::X * x) * DAffine3::from_rotation_y(angle);
