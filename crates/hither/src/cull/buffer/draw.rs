@@ -367,7 +367,7 @@ impl Band {
         }
     }
 
-    /// Places each vertex of a patch that needs clipping, as [`clip`] would, and notes what it is beyond.
+    /// Places each vertex of a patch that needs clipping, as [`clip()`] would, and notes what it is beyond.
     fn place_apart(&mut self, standing: &Standing, patch: &Patch, placing: &Placing) {
         let vertices = &standing.occluder.vertices;
         let (first, count) = (patch.first_vertex as usize, patch.vertices as usize);
