@@ -30,8 +30,7 @@ pub(super) fn draw_once(crew: Crew, pieces: &mut Vec<Piece>) {
     }
     let sort = |laid: &Laid| Sorted::new(crew, &laid.grid, laid);
     let mut cells = sort(&Laid::new(crew, pieces));
-    if cells.most() > CROWD {
-        drop_twins(pieces);
+    if cells.most() > CROWD && drop_twins(pieces, &cells) {
         cells = sort(&Laid::new(crew, pieces));
     }
     let mut lines = Vec::new();
@@ -93,15 +92,30 @@ fn overlaps(cells: &Sorted, range: Range<usize>, pieces: &[Piece], lines: &[Line
     found
 }
 
-/// Of pieces with the same ends only the most important stays: so many on one another would be compared each
-/// with each.
-fn drop_twins(pieces: &mut Vec<Piece>) {
-    let key = |p: &Piece| {
+/// Of pieces with the same ends in crowded cells only the most important stays: so many on one another would be
+/// compared each with each. Whether there were any.
+fn drop_twins(pieces: &mut Vec<Piece>, cells: &Sorted) -> bool {
+    let key = |i: &u32| {
+        let p = &pieces[*i as usize];
         let ends = p.ends.map(|e| (e + 0.0).to_array().map(f64::to_bits));
         [ends[0].min(ends[1]), ends[0].max(ends[1])]
     };
-    pieces.sort_by_cached_key(|p| (key(p), p.covers, p.kind, p.part));
-    pieces.dedup_by(|later, first| key(later) == key(first));
+    let crowds = (0..cells.len()).map(|cell| cells.in_cell(cell)).filter(|list| list.len() > CROWD as usize);
+    let mut suspects: Vec<u32> = crowds.flatten().copied().collect();
+    suspects.sort_unstable();
+    suspects.dedup();
+    suspects.sort_by_cached_key(|i| {
+        let p = &pieces[*i as usize];
+        (key(i), p.covers, p.kind, p.part)
+    });
+    let mut is_twin = vec![false; pieces.len()];
+    for same in suspects.chunk_by(|a, b| key(a) == key(b)) {
+        same[1..].iter().for_each(|&i| is_twin[i as usize] = true);
+    }
+    let before = pieces.len();
+    let mut twin = is_twin.into_iter();
+    pieces.retain(|_| twin.next() != Some(true));
+    pieces.len() < before
 }
 
 /// Whether piece `a` is kept where it coincides with piece `b`.
