@@ -20,6 +20,7 @@ pub(crate) use mesh::{BlockTree, MeshIndex};
 pub(crate) use tree::{Box3, Child, Slot, WideNode, WideTree};
 
 use crate::scene::{Content, Scene, Transform};
+use glam::DAffine3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -84,6 +85,23 @@ impl SceneIndex {
     /// How it was built.
     pub fn options(&self) -> &IndexOptions {
         &self.options
+    }
+
+    /// The mesh of an instance; `None` if there is no such instance. `visit` gets the maps from the root down to it, each
+    /// from what a group holds to the group. Cost: the depth, times the logarithm of the groups' sizes.
+    pub(crate) fn descend(&self, instance: u32, mut visit: impl FnMut(&DAffine3)) -> Option<u32> {
+        let (mut group, mut rest) = (self.scene.root, instance);
+        loop {
+            let items = &self.groups[group as usize].items;
+            let item = items[..items.partition_point(|i| i.first_instance <= rest)].last()?;
+            visit(&item.group_from_content);
+            rest -= item.first_instance;
+            match item.content {
+                Content::Mesh(mesh) => return (rest == 0).then_some(mesh),
+                Content::Group(g) => group = g,
+                Content::Nothing => return None,
+            }
+        }
     }
 
     /// Poses the scene at `time` seconds of animation `animation` and refits what moved; static parts are

@@ -425,17 +425,7 @@ fn screen_from_instance(
     root: ScreenFromObject,
     instance: u32,
 ) -> Option<(u32, ScreenFromObject)> {
-    let (mut at, mut rest) = (root, instance);
-    let mut group = index.scene().root;
-    loop {
-        let items = &index.groups[group as usize].items;
-        let item = items[..items.partition_point(|i| i.first_instance <= rest)].last()?;
-        at = at.after(&item.group_from_content);
-        rest -= item.first_instance;
-        match item.content {
-            Content::Mesh(mesh) => return (rest == 0).then_some((mesh, at)),
-            Content::Group(g) => group = g,
-            Content::Nothing => return None,
-        }
-    }
+    let mut at = root;
+    let mesh = index.descend(instance, |group_from_content| at = at.after(group_from_content))?;
+    Some((mesh, at))
 }
