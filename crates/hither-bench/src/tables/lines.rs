@@ -25,7 +25,8 @@ pub(crate) const INFO: TableInfo = TableInfo {
         column("write_ms", "write ms", 1),
         column("total_ms", "total ms", 1),
         column("intersections_ms", "with intersections", 1),
-        column("two_threads_draw_ms", "draw, two threads", 1),
+        column("two_threads_ms", "two threads", 1),
+        column("two_threads_ratio", "one/two threads", 2),
         column("line_art_ms", "Line Art's", 0),
         column("line_art_ratio", "Line Art's/total", 1),
     ],
@@ -63,18 +64,22 @@ fn make(table: &mut Table, options: &Options) -> Result<(), String> {
     let folder = std::env::temp_dir();
     let name = |extension: &str| folder.join(format!("hither-lines-{}.{extension}", std::process::id()));
     let (from, to) = (name("obj"), name("svg"));
+    let (one, two) = (pool(1)?, pool(2)?);
     for (title, input, line_art) in inputs {
         (options.progress)(&format!("lines: {title}"));
         let polygons = input();
         std::fs::write(&from, polygons.obj()).map_err(|e| format!("{}: {e}", from.display()))?;
         let edges = Kinds { intersection: false, contact: false, ..Kinds::ALL };
-        let measured = measure(&from, &to, edges, 1).and_then(|plain| {
-            Ok((plain, measure(&from, &to, Kinds::ALL, 1)?, measure(&from, &to, edges, 2)?))
+        let measured = one.install(|| {
+            measure(&from, &to, edges)
+                .and_then(|plain| Ok((plain, measure(&from, &to, Kinds::ALL)?.iter().sum::<f64>())))
         });
+        let with_two = two.install(|| measure(&from, &to, edges));
         let _ = std::fs::remove_file(&from);
         let _ = std::fs::remove_file(&to);
-        let (plain, meeting, two) = measured?;
+        let (plain, meeting) = measured?;
         let total: f64 = plain.iter().sum();
+        let two: f64 = with_two?.iter().sum();
         table.push([
             Cell::from(title),
             polygons.triangles().into(),
@@ -83,8 +88,9 @@ fn make(table: &mut Table, options: &Options) -> Result<(), String> {
             plain[2].into(),
             plain[3].into(),
             total.into(),
-            meeting.iter().sum::<f64>().into(),
-            two[2].into(),
+            meeting.into(),
+            two.into(),
+            (total / two).into(),
             line_art.into(),
             line_art.map(|l| l / total).into(),
         ]);
@@ -97,8 +103,12 @@ fn make(table: &mut Table, options: &Options) -> Result<(), String> {
     Ok(())
 }
 
+fn pool(threads: usize) -> Result<rayon::ThreadPool, String> {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| e.to_string())
+}
+
 /// Medians of reading, preparing, drawing and writing, milliseconds.
-fn measure(from: &Path, to: &Path, kinds: Kinds, threads: usize) -> Result<[f64; 4], String> {
+fn measure(from: &Path, to: &Path, kinds: Kinds) -> Result<[f64; 4], String> {
     let mut times: [Vec<Duration>; 4] = Default::default();
     for _ in 0..RUNS {
         let (read, loaded) = timed(|| hither_io::read(from));
@@ -107,7 +117,7 @@ fn measure(from: &Path, to: &Path, kinds: Kinds, threads: usize) -> Result<[f64;
         let bounds = scene.bounds().ok_or("the input is empty")?;
         let direction = standard_view("front").ok_or("there is no front view")?;
         let view = direction.view(&bounds, 900.0 / direction.extent(&bounds).max_element(), 50);
-        let options = LineOptions { kinds, crease_angle: 0.0, threads, ..LineOptions::default() };
+        let options = LineOptions { kinds, crease_angle: 0.0, ..LineOptions::default() };
         let (draw, drawing) = timed(|| preparation.draw(&view, &options));
         let drawing = drawing.map_err(|e| e.to_string())?;
         let (write, written) = timed(|| hither_io::write_svg(to, &sheet(&drawing)));
@@ -133,16 +143,17 @@ fn sheet(drawing: &Drawing) -> Sheet<'_> {
 }
 
 fn growth(table: &mut Table, options: &Options) -> Result<(), String> {
+    let one = pool(1)?;
     for n in [1u64, 2, 3, 5, 7, 9] {
         (options.progress)(&format!("lines-growth: n = {n}"));
         let scene = world(&format!("office?n={n}"))?;
         let view = view(&scene, "corridor", (1280, 720))?;
         let preparation = Preparation::new(&scene, &PrepareOptions::default());
-        let line_options = LineOptions { threads: 1, ..LineOptions::default() };
+        let line_options = LineOptions::default();
         let mut times = Vec::new();
         let mut last = None;
         for _ in 0..3 {
-            let (time, drawing) = timed(|| preparation.draw(&view, &line_options));
+            let (time, drawing) = one.install(|| timed(|| preparation.draw(&view, &line_options)));
             times.push(time);
             last = Some(drawing.map_err(|e| e.to_string())?);
         }

@@ -7,8 +7,12 @@
 use super::{Sheet, SheetView, Unit, push_fixed};
 use crate::{Error, write_whole};
 use hither::hidden_line::{Drawing, Face, Stroke};
+use rayon::prelude::*;
 use std::io::{self, Write};
 use std::path::Path;
+
+/// Strokes that one thread formats at a time.
+const BLOCK: usize = 256;
 
 /// Digits after the point: a hundredth of a pixel, a thousandth of a millimetre.
 fn digits(unit: Unit) -> usize {
@@ -50,26 +54,34 @@ fn write_view(file: &mut dyn Write, sheet: &Sheet, view: &SheetView) -> io::Resu
         if view.name.is_empty() { String::new() } else { format!(" id=\"{}\"", identifier(&view.name)) };
     writeln!(file, "<g class=\"view\"{name}>")?;
     write_faces(file, sheet, view)?;
-    let mut text = Vec::new();
-    for of_part in view.drawing.strokes.chunk_by(|a, b| a.part == b.part) {
-        let part = of_part[0].part;
+    let class = |s: &Stroke| (s.part, s.kind, s.covers);
+    let groups: Vec<&[Stroke]> = view.drawing.strokes.chunk_by(|a, b| class(a) == class(b)).collect();
+    let blocks: Vec<&[Stroke]> = groups.iter().flat_map(|group| group.chunks(BLOCK)).collect();
+    let path = |block: &&[Stroke]| {
+        let mut text = Vec::new();
+        for stroke in *block {
+            push_path(&mut text, sheet, view, view.drawing.points_of(stroke), false);
+        }
+        text
+    };
+    let mut texts = blocks.par_iter().map(path).collect::<Vec<_>>().into_iter();
+    for of_part in groups.chunk_by(|a, b| a[0].part == b[0].part) {
+        let part = of_part[0][0].part;
         writeln!(
             file,
             "<g class=\"part\" data-part=\"{part}\" data-name=\"{}\">",
             escaped(sheet.part_name(part))
         )?;
-        for group in of_part.chunk_by(|a, b| (a.kind, a.covers) == (b.kind, b.covers)) {
+        for group in of_part {
             let Stroke { kind, covers, .. } = group[0];
-            text.clear();
-            for stroke in group {
-                push_path(&mut text, sheet, view, view.drawing.points_of(stroke), false);
-            }
             let class = match covers {
                 0 => format!("class=\"visible {}\"", kind.name()),
                 n => format!("class=\"hidden {}\" data-covers=\"{n}\"", kind.name()),
             };
             write!(file, "<path {class} d=\"")?;
-            file.write_all(&text)?;
+            for text in texts.by_ref().take(group.len().div_ceil(BLOCK)) {
+                file.write_all(&text)?;
+            }
             writeln!(file, "\"/>")?;
         }
         writeln!(file, "</g>")?;

@@ -38,9 +38,10 @@ pub(super) struct Body {
 const CERTAIN: f64 = 1e-14;
 
 impl Bodies {
-    /// Finds the bodies of a mesh, as [`Topology`] describes it. Three passes over the triangles in their
-    /// order, which takes less time than a walk from neighbour to neighbour.
-    pub fn find(positions: &[Vec3], triangles: &[[u32; 3]], neighbours: &[[u32; 3]], flips: &[u8]) -> Bodies {
+    /// Finds the bodies of a mesh. Three passes over the triangles in their order, which takes less time than a
+    /// walk from neighbour to neighbour.
+    pub fn find(crew: Crew, topology: &Topology) -> Bodies {
+        let Topology { positions, triangles, neighbours, flips, .. } = topology;
         let mut run_of = connected(neighbours);
         let mut runs: Vec<Run> = Vec::new();
         for t in 0..triangles.len() {
@@ -61,11 +62,21 @@ impl Bodies {
                 (run.min, run.max) = (run.min.min(p), run.max.max(p));
             }
         }
-        for (t, &run) in run_of.iter().enumerate().filter(|(_, run)| **run != NONE) {
-            let run = &mut runs[run as usize];
-            if !run.failed {
-                run.look_at(triangles[t].map(|v| positions[v as usize].as_dvec3()));
+        // A share keeps all runs: with many runs that would be more than the triangles.
+        let threads = if runs.len() < triangles.len() / 16 { crew.threads } else { 1 };
+        let looked = crew.map(Crew { threads }.shares(triangles.len(), 1), |range| {
+            let mut runs = runs.clone();
+            for (t, &run) in range.clone().zip(&run_of[range]).filter(|(_, run)| **run != NONE) {
+                let run = &mut runs[run as usize];
+                if !run.failed {
+                    let at = |k: usize| positions[triangles[t][k] as usize].as_dvec3();
+                    run.look_at(at(0), at(1), at(2));
+                }
             }
+            runs
+        });
+        for share in looked {
+            runs.iter_mut().zip(share).for_each(|(run, more)| run.join(&more));
         }
         let mut list = Vec::new();
         let number = |run: &Run| {
@@ -120,10 +131,10 @@ impl Bodies {
             if (0..3).any(|k| corners[k] == b && corners[(k + 1) % 3] == a) {
                 (a, b) = (b, a);
             }
-            let [mut a, mut b] = [a, b].map(|v| paper.screen[v as usize]);
             if paper.front[body as usize] < 0 {
                 (a, b) = (b, a);
             }
+            let (a, b) = (paper.screen[a as usize], paper.screen[b as usize]);
             let center = paper.centers[body as usize];
             let turns_on = cross(a, b, center) > 0.0;
             let met = u32::from(a.y <= center.y && center.y < b.y);
@@ -198,15 +209,23 @@ impl Run {
         (self.min.as_dvec3() + self.max.as_dvec3()) * 0.5
     }
 
+    /// Takes in what was seen of the same run elsewhere.
+    fn join(&mut self, other: &Run) {
+        self.failed |= other.failed || self.turn * other.turn < 0;
+        self.turn = if self.turn == 0 { other.turn } else { self.turn };
+        self.rounds += other.rounds;
+    }
+
     /// Looks at a triangle from the centre.
-    fn look_at(&mut self, corners: [DVec3; 3]) {
+    #[inline]
+    fn look_at(&mut self, a: DVec3, b: DVec3, c: DVec3) {
         let center = self.center();
-        let [p, q, r] = corners.map(|c| c - center);
+        let (p, q, r) = (a - center, b - center, c - center);
         let volume = p.dot(q.cross(r));
-        let [a, b, c] = [p, q, r].map(|s| s.abs().element_sum());
+        let size = p.abs().element_sum() * q.abs().element_sum() * r.abs().element_sum();
         let turn = if volume > 0.0 { 1 } else { -1 };
         // The comparison fails for NaN, too.
-        let certain = volume.abs() > CERTAIN * a * b * c;
+        let certain = volume.abs() > CERTAIN * size;
         self.failed |= !certain || self.turn == -turn;
         self.turn = turn;
         let beside = |p: f64, q: f64, r: f64| p.min(q).min(r) > 0.0 || p.max(q).max(r) < 0.0;
@@ -214,8 +233,7 @@ impl Run {
             return;
         }
         let flat = |p: DVec3| DVec3::new(p.y, p.z, 0.0);
-        let [a, b, c] = corners.map(flat);
-        let [a, b, c] = if turn > 0 { [a, b, c] } else { [a, c, b] };
+        let (a, b, c) = if turn > 0 { (flat(a), flat(b), flat(c)) } else { (flat(a), flat(c), flat(b)) };
         let center = flat(center);
         let left = |a: DVec3, b: DVec3| {
             let side = cross(a, b, center);
@@ -227,6 +245,7 @@ impl Run {
 
 #[cfg(test)]
 mod tests {
+    use super::super::crew::Crew;
     use super::super::topology::Topology;
     use crate::scene::{Mesh, Primitive, Scene};
     use glam::Vec3;
@@ -263,7 +282,7 @@ mod tests {
     }
 
     fn bodies(mesh: &Mesh) -> Vec<bool> {
-        let topology = Topology::of(&Scene::new("test"), mesh, &[]);
+        let topology = Topology::of(Crew { threads: 1 }, &Scene::new("test"), mesh, &[]);
         topology.bodies.list.iter().map(|b| b.outward).collect()
     }
 

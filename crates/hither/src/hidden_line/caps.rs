@@ -119,7 +119,8 @@ fn add_line(shown: &mut Shown, of: Cap, triangle: u32, ends: [DVec3; 2]) {
 
 fn add_triangle(shown: &mut Shown, corners: [DVec3; 3], cap: Cap) {
     let vertices = corners.map(|p| add_point(shown, p));
-    let facing = orientation(vertices.map(|v| shown.screen[v as usize]));
+    let [a, b, c] = vertices.map(|v| shown.screen[v as usize]);
+    let facing = orientation(a, b, c);
     shown.triangles.push(vertices);
     shown.facing.push(facing);
     shown.fate.push(if facing == 0 { Fate::EdgeOn } else { Fate::Live });

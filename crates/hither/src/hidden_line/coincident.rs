@@ -28,7 +28,7 @@ pub(super) fn draw_once(crew: Crew, pieces: &mut Vec<Piece>) {
     if pieces.len() < 2 {
         return;
     }
-    let sort = |laid: &Laid| Sorted::new(crew, &laid.grid, laid);
+    let sort = |laid: &Laid| Sorted::on(crew, &laid.grid, laid);
     let mut cells = sort(&Laid::new(crew, pieces));
     if cells.most() > CROWD && drop_twins(pieces, &cells) {
         cells = sort(&Laid::new(crew, pieces));

@@ -315,7 +315,8 @@ impl Walk<'_> {
 
 /// Whether a triangle may have a point in the square around `center`. Errs towards yes.
 fn touches(corners: &[DVec3; 3], center: DVec2, reach: f64) -> bool {
-    let p = [0, 1, 2].map(|k: usize| corners[k].truncate() - center);
+    let at = |k: usize| corners[k].truncate() - center;
+    let p = [at(0), at(1), at(2)];
     let (low, high) = (p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2]));
     if low.x > reach || low.y > reach || high.x < -reach || high.y < -reach {
         return false;
@@ -331,8 +332,9 @@ fn touches(corners: &[DVec3; 3], center: DVec2, reach: f64) -> bool {
 /// Whether a point is clearly in a triangle, or on its outline.
 fn contains(corners: &[DVec3; 3], p: DVec2) -> bool {
     let p = p.extend(0.0);
-    let sides = [0, 1, 2].map(|k: usize| cross(corners[k], corners[(k + 1) % 3], p));
-    sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0)
+    let [a, b, c] = *corners;
+    let (s, t, u) = (cross(a, b, p), cross(b, c, p), cross(c, a, p));
+    s.min(t).min(u) >= 0.0 || s.max(t).max(u) <= 0.0
 }
 
 /// The triangle that continues the surface over edge `k` of `t`; `None` at a fold or where there is none.

@@ -1,4 +1,4 @@
-//! Who does the work: one thread, or as many as a drawing was given.
+//! Who does the work: one thread, or all of the pool that a drawing is made in.
 //!
 //! Work is cut into shares whose results do not depend on which thread does which, and come back in order. So
 //! a drawing does not depend on the number of threads.
@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The threads of a drawing; all that is run on it is run inside its pool.
+/// The threads of a drawing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Crew {
     pub threads: usize,
@@ -16,6 +16,25 @@ pub(super) struct Crew {
 const FEW: usize = 4096;
 
 impl Crew {
+    /// The threads of the pool that this is called in.
+    pub fn here() -> Crew {
+        Crew { threads: rayon::current_num_threads() }
+    }
+
+    /// Does the work inside the pool: from outside, each piece would be handed in by itself.
+    pub fn inside<R: Send>(self, work: impl FnOnce() -> R + Send) -> R {
+        if self.threads == 1 { work() } else { rayon::scope(|_| work()) }
+    }
+
+    /// Does two things, at the same time if there are two threads.
+    pub fn both<A: Send, B: Send>(
+        self,
+        first: impl FnOnce() -> A + Send,
+        second: impl FnOnce() -> B + Send,
+    ) -> (A, B) {
+        if self.threads == 1 { (first(), second()) } else { rayon::join(first, second) }
+    }
+
     /// Ranges of about equal length that together are `0..count`, `each` for a thread; one if there is one
     /// thread.
     pub fn ranges(self, count: usize, each: usize) -> Vec<Range<usize>> {

@@ -54,18 +54,8 @@ impl Preparation {
     /// Draws what `view` sees. Errors: a view that cannot be drawn ([`View::validate`]).
     pub fn draw(&self, view: &View, options: &LineOptions) -> Result<Drawing, ViewError> {
         view.validate()?;
-        let threads = match options.threads {
-            0 => std::thread::available_parallelism().map_or(1, usize::from),
-            n => n,
-        };
-        if threads == 1 {
-            return Ok(self.drawing(view, options, Crew { threads }));
-        }
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        Ok(match pool {
-            Ok(pool) => pool.install(|| self.drawing(view, options, Crew { threads })),
-            Err(_) => self.drawing(view, options, Crew { threads: 1 }),
-        })
+        let crew = Crew::here();
+        Ok(crew.inside(|| self.drawing(view, options, crew)))
     }
 
     fn drawing(&self, view: &View, options: &LineOptions, crew: Crew) -> Drawing {
@@ -86,6 +76,7 @@ impl Preparation {
         if let Some(cover) = &mut cover {
             cover.settle_cells(&shown, &occluders, |t| !see_through(t));
         }
+        drop(see_through);
         // What is seen through hides nothing, but is seen, and meets others.
         let surfaces =
             sees_through(&shown, options).then(|| Occluders::new(&shown, grid, cover.as_ref(), |_| true));
@@ -108,7 +99,9 @@ impl Preparation {
         counters.segments = pieces.len() as u64;
         counters.visible_segments = pieces.iter().filter(|p| p.covers == 0).count() as u64;
         coincident::draw_once(crew, &mut pieces);
-        let (points, mut strokes) = strokes::join(crew, pieces);
+        // Giving back so much memory takes a while.
+        let ((points, mut strokes), ()) =
+            crew.both(|| strokes::join(crew, pieces), || drop((shown, occluders, surfaces, cover)));
         strokes.retain(|s| !is_speck(&points[s.points.start as usize..s.points.end as usize]));
         Drawing { width: picture.x, height: picture.y, points, strokes, faces, counters }
     }
@@ -251,7 +244,7 @@ fn trace_edges(tracer: &Tracer, options: &LineOptions, counters: &mut Counters) 
         for edge in &solid.topology.edges[range] {
             let Some(kind) = choice.kind(shown, solid, edge) else { continue };
             let Some(ends) = shown.edge(solid, edge.vertices) else { continue };
-            let [p, q] = ends.map(|v| shown.screen[v as usize]);
+            let (p, q) = (shown.screen[ends[0] as usize], shown.screen[ends[1] as usize]);
             if (q - p).truncate() == DVec2::ZERO {
                 continue;
             }

@@ -79,7 +79,7 @@ impl Grid {
     }
 }
 
-/// Things to be sorted into the cells of a grid.
+/// Things to be sorted into rows of cells: those of a grid, or any.
 pub(super) trait Places: Sync {
     /// Calls `visit` for every thing and every cell of these rows that it belongs to, things in order; cells
     /// are counted from the first of the rows.
@@ -94,16 +94,22 @@ pub(super) struct Sorted {
 }
 
 impl Sorted {
-    /// Visits all things twice: to count them, and to put them in their places.
-    pub fn new(crew: Crew, grid: &Grid, places: &impl Places) -> Sorted {
-        let bands = crew.ranges(grid.rows, 1);
-        let cells = |rows: &Range<usize>| grid.index(0, rows.start)..grid.index(0, rows.end);
+    /// Sorts into the cells of a grid.
+    pub fn on(crew: Crew, grid: &Grid, places: &impl Places) -> Sorted {
+        Sorted::new(crew, grid.rows, grid.columns, places)
+    }
+
+    /// Sorts into so many rows of so many cells. Each thread visits all things twice: to count them, and to put
+    /// those of its rows in their places.
+    pub fn new(crew: Crew, rows: usize, columns: usize, places: &impl Places) -> Sorted {
+        let bands = crew.ranges(rows, 1);
+        let cells = |rows: &Range<usize>| rows.start * columns..rows.end * columns;
         let counts = crew.map(bands.clone(), |rows| {
             let mut counts = vec![0u32; cells(&rows).len()];
             places.visit(&rows, |cell, _| counts[cell] += 1);
             counts
         });
-        let mut starts = Vec::with_capacity(grid.len() + 1);
+        let mut starts = Vec::with_capacity(rows * columns + 1);
         let mut sum = 0;
         starts.push(0);
         for count in counts.iter().flatten() {

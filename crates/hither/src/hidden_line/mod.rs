@@ -2,6 +2,8 @@
 //!
 //! [`Preparation::new`] finds the edges of every mesh once; [`Preparation::draw`] makes a [`Drawing`] for a
 //! [`View`](crate::conventions::View), and may be called for as many views as one likes. There is no file format here.
+//! Both share their work among the threads of the `rayon` pool that they are called in; a drawing does not depend
+//! on their number.
 //!
 //! How a drawing is made:
 //! 1. `shown`: instances that may be seen are clipped and projected, nearest first; `cover` notes for each
@@ -41,6 +43,7 @@ mod junctions;
 mod lens;
 mod occluders;
 mod predicates;
+mod seams;
 mod shown;
 mod strokes;
 mod topology;
@@ -54,6 +57,7 @@ pub use drawing::{Counters, Drawing, Face, Kind, Stroke};
 
 use crate::geometry::Aabb;
 use crate::scene::Scene;
+use crew::Crew;
 use glam::{DAffine3, DVec3};
 use topology::Topology;
 
@@ -155,8 +159,6 @@ pub struct LineOptions {
     pub faces: Option<FaceColor>,
     /// Distance of lines that fill faces, pixels; the faces are shaded flat for it.
     pub hatch: Option<f64>,
-    /// Worker threads; 0 is one for each core. The drawing does not depend on it.
-    pub threads: usize,
 }
 
 impl Default for LineOptions {
@@ -169,7 +171,6 @@ impl Default for LineOptions {
             sections: Vec::new(),
             faces: None,
             hatch: None,
-            threads: 0,
         }
     }
 }
@@ -190,8 +191,9 @@ impl Preparation {
         let marked = |mesh: usize| -> Vec<[u32; 2]> {
             options.marked.iter().filter(|m| m.0 as usize == mesh).map(|m| m.1).collect()
         };
-        let meshes =
-            scene.meshes.iter().enumerate().map(|(i, m)| Topology::of(scene, m, &marked(i))).collect();
+        let crew = Crew::here();
+        let topology = |i: usize| Topology::of(crew, scene, &scene.meshes[i], &marked(i));
+        let meshes = crew.inside(|| crew.map((0..scene.meshes.len()).collect(), topology));
         let bounds = scene.meshes.iter().map(|m| m.bounds().union(&m.bounds_of_lines())).collect();
         let mut preparation = Preparation { meshes, bounds, instances: Vec::new(), tolerance: 0.0 };
         preparation.pose(scene);

@@ -70,7 +70,7 @@ impl Bounds {
 impl Occluder {
     fn new(corners: &[DVec3; 3], triangle: u32, sheet: u32) -> Occluder {
         let (min, max) = rectangle(*corners);
-        let w = corners.map(|c| c.z);
+        let w = [corners[0].z, corners[1].z, corners[2].z];
         Occluder {
             bounds: Bounds::around(min, max),
             nearest: (w[0].max(w[1]).max(w[2]) as f32).next_up(),
@@ -104,7 +104,7 @@ impl Occluders {
         };
         shown.crew.extend(&mut cells, list.len(), cells_of);
         let binning = Binning { shown, grid: &grid, cover, list: &list, cells: &cells };
-        let sorted = Sorted::new(shown.crew, &grid, &binning);
+        let sorted = Sorted::on(shown.crew, &grid, &binning);
         let large = cells.iter().map(is_large).collect();
         Occluders { grid, cells: sorted, list, large }
     }

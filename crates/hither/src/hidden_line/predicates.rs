@@ -24,7 +24,7 @@ fn exact(a: DVec3, b: DVec3, c: DVec3) -> f64 {
 
 /// The sense of rotation of a triangle on the paper: 1, −1, or 0 where its corners lie on a line.
 #[inline]
-pub(super) fn orientation([a, b, c]: [DVec3; 3]) -> i8 {
+pub(super) fn orientation(a: DVec3, b: DVec3, c: DVec3) -> i8 {
     let value = cross(a, b, c);
     i8::from(value > 0.0) - i8::from(value < 0.0)
 }

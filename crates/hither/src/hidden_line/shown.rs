@@ -136,7 +136,7 @@ impl<'p> Shown<'p> {
         let (fresh, screen) = (&self.triangles[first_triangle as usize..], &self.screen);
         crew.extend(&mut self.facing, fresh.len(), |t| match fresh[t] {
             [NONE, ..] => 0,
-            corners => orientation(corners.map(|v| screen[v as usize])),
+            [a, b, c] => orientation(screen[a as usize], screen[b as usize], screen[c as usize]),
         });
         let facing = &self.facing[first_triangle as usize..];
         self.fate.extend(facing.iter().map(|&f| if f == 0 { Fate::EdgeOn } else { Fate::Live }));

@@ -8,9 +8,12 @@
 use super::crew::Crew;
 use super::draw::Piece;
 use super::drawing::Stroke;
+use super::grid::{Places, Sorted};
 use super::topology::{Mix, NONE};
 use glam::DVec2;
 use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Ends are at the same point if they agree to this part of a pixel.
 const JOIN_PER_PX: f64 = 32_768.0;
@@ -27,7 +30,7 @@ pub(super) fn join(crew: Crew, mut pieces: Vec<Piece>) -> (Vec<DVec2>, Vec<Strok
     let mut strokes = Vec::new();
     let runs: Vec<&[Piece]> = pieces.chunk_by(|a, b| group(a) == group(b)).collect();
     let joined = crew.map(runs.clone(), |run| {
-        let mut trails = Joints::of(run).trails(run);
+        let mut trails = Joints::of(crew, run).trails(run);
         order(&mut trails);
         trails
     });
@@ -44,8 +47,6 @@ pub(super) fn join(crew: Crew, mut pieces: Vec<Piece>) -> (Vec<DVec2>, Vec<Strok
 
 /// How the ends of pieces are joined. End 2i is the first of piece i, 2i + 1 its second.
 struct Joints {
-    /// The point of each end.
-    node: Vec<u32>,
     /// The end that each end goes on with, or [`NONE`].
     partner: Vec<u32>,
     /// The ends at each point.
@@ -54,76 +55,34 @@ struct Joints {
 }
 
 impl Joints {
-    fn of(pieces: &[Piece]) -> Joints {
-        let mut names: HashMap<[i64; 2], u32, Mix> = HashMap::with_capacity_and_hasher(pieces.len(), Mix);
-        let mut node = Vec::with_capacity(pieces.len() * 2);
-        for p in pieces.iter().flat_map(|p| p.ends) {
-            let key = [(p.x * JOIN_PER_PX).round() as i64, (p.y * JOIN_PER_PX).round() as i64];
-            let fresh = names.len() as u32;
-            node.push(*names.entry(key).or_insert(fresh));
+    fn of(crew: Crew, pieces: &[Piece]) -> Joints {
+        let bands = Bands::of(crew, pieces);
+        let sorted = Sorted::new(crew, bands.count, 1, &bands);
+        let partner: Vec<AtomicU32> = (0..bands.keys.len()).map(|_| AtomicU32::new(NONE)).collect();
+        let found = crew.map_with(crew.ranges(bands.count, 4), HashMap::default, |names, range| {
+            let mut points = Points::default();
+            for band in range {
+                points.find(sorted.in_cell(band), &bands.keys, names);
+            }
+            for point in 0..points.starts.len() {
+                pair(pieces, points.at(point), &partner);
+            }
+            points
+        });
+        let partner = partner.into_iter().map(AtomicU32::into_inner).collect();
+        let mut joints = Joints { partner, starts: Vec::new(), ends: Vec::with_capacity(bands.keys.len()) };
+        for points in found {
+            let before = joints.ends.len() as u32;
+            joints.starts.extend(points.starts.iter().map(|s| s + before));
+            joints.ends.extend(points.ends);
         }
-        let mut starts = vec![0u32; names.len() + 1];
-        for &n in &node {
-            starts[n as usize + 1] += 1;
-        }
-        for i in 1..starts.len() {
-            starts[i] += starts[i - 1];
-        }
-        let mut next = starts.clone();
-        let mut ends = vec![0; node.len()];
-        for (end, &n) in node.iter().enumerate() {
-            ends[next[n as usize] as usize] = end as u32;
-            next[n as usize] += 1;
-        }
-        let mut joints = Joints { partner: vec![NONE; node.len()], node, starts, ends };
-        for n in 0..names.len() {
-            joints.pair(pieces, n);
-        }
+        joints.starts.push(joints.ends.len() as u32);
         joints.take_in_rounds();
         joints
     }
 
-    fn at(&self, node: usize) -> std::ops::Range<usize> {
+    fn at(&self, node: usize) -> Range<usize> {
         self.starts[node] as usize..self.starts[node + 1] as usize
-    }
-
-    /// Pairs the ends at a point, the straightest first.
-    fn pair(&mut self, pieces: &[Piece], node: usize) {
-        let range = self.at(node);
-        if range.len() < 2 {
-            return;
-        }
-        if range.len() == 2 {
-            let (a, b) = (self.ends[range.start], self.ends[range.start + 1]);
-            self.link(a, b);
-            return;
-        }
-        let away = |end: u32| {
-            let ends = pieces[end as usize / 2].ends;
-            let (here, there) = (ends[end as usize % 2], ends[1 - end as usize % 2]);
-            (there - here).normalize_or_zero()
-        };
-        let mut left: Vec<(u32, DVec2)> = self.ends[range].iter().map(|&e| (e, away(e))).collect();
-        // A crowd is paired as it comes: looking for the best would take its square.
-        let crowd = left.len() > 64;
-        while left.len() > 1 {
-            let mut best = (0, 1, f64::INFINITY);
-            for i in 0..left.len() {
-                for j in i + 1..left.len() {
-                    let bend = left[i].1.dot(left[j].1);
-                    if bend < best.2 {
-                        best = (i, j, bend);
-                    }
-                }
-                if crowd {
-                    break;
-                }
-            }
-            let (i, j, _) = best;
-            self.link(left[i].0, left[j].0);
-            left.swap_remove(j);
-            left.swap_remove(i);
-        }
     }
 
     fn link(&mut self, a: u32, b: u32) {
@@ -177,7 +136,7 @@ impl Joints {
 
     /// For each piece the first piece of its stroke; and for those, whether it is closed.
     fn label(&self) -> (Vec<u32>, Vec<bool>) {
-        let pieces = self.node.len() / 2;
+        let pieces = self.partner.len() / 2;
         let mut trail = vec![NONE; pieces];
         let mut closed = vec![false; pieces];
         for piece in 0..pieces {
@@ -230,6 +189,136 @@ impl Joints {
             trails.push(trail);
         }
         trails
+    }
+}
+
+/// Pairs the ends at a point, the straightest first.
+fn pair(pieces: &[Piece], ends: &[u32], partner: &[AtomicU32]) {
+    let link = |a: u32, b: u32| {
+        partner[a as usize].store(b, Relaxed);
+        partner[b as usize].store(a, Relaxed);
+    };
+    if let [a, b] = *ends {
+        link(a, b);
+    }
+    if ends.len() < 3 {
+        return;
+    }
+    let away = |end: u32| {
+        let ends = pieces[end as usize / 2].ends;
+        let (here, there) = (ends[end as usize % 2], ends[1 - end as usize % 2]);
+        (there - here).normalize_or_zero()
+    };
+    let mut left: Vec<(u32, DVec2)> = ends.iter().map(|&e| (e, away(e))).collect();
+    // A crowd is paired as it comes: looking for the best would take its square.
+    let crowd = left.len() > 64;
+    while left.len() > 1 {
+        let mut best = (0, 1, f64::INFINITY);
+        for i in 0..left.len() {
+            for j in i + 1..left.len() {
+                let bend = left[i].1.dot(left[j].1);
+                if bend < best.2 {
+                    best = (i, j, bend);
+                }
+            }
+            if crowd {
+                break;
+            }
+        }
+        let (i, j, _) = best;
+        link(left[i].0, left[j].0);
+        left.swap_remove(j);
+        left.swap_remove(i);
+    }
+}
+
+/// Ends of pieces by bands of the paper, so narrow that what is known of a band fits the processor's caches.
+struct Bands {
+    /// The point of each end, in steps of [`JOIN_PER_PX`]: y above x.
+    keys: Vec<u64>,
+    top: i32,
+    per_step: f64,
+    count: usize,
+}
+
+impl Bands {
+    /// Ends in a band, on average.
+    const ENDS: usize = 4096;
+
+    fn of(crew: Crew, pieces: &[Piece]) -> Bands {
+        let mut keys = Vec::new();
+        crew.extend(&mut keys, pieces.len() * 2, |end| {
+            let [x, y] = (pieces[end / 2].ends[end % 2] * JOIN_PER_PX).round().to_array();
+            u64::from(y as i32 as u32) << 32 | u64::from(x as i32 as u32)
+        });
+        let (mut top, mut bottom) = (i32::MAX, i32::MIN);
+        for key in &keys {
+            (top, bottom) = (top.min(y_of(*key)), bottom.max(y_of(*key)));
+        }
+        let count = keys.len() / Bands::ENDS + 1;
+        let per_step = count as f64 / (f64::from(bottom) - f64::from(top) + 1.0);
+        Bands { keys, top, per_step, count }
+    }
+}
+
+fn y_of(key: u64) -> i32 {
+    (key >> 32) as u32 as i32
+}
+
+impl Places for Bands {
+    #[inline(always)]
+    fn visit(&self, bands: &Range<usize>, mut visit: impl FnMut(usize, usize)) {
+        for (end, &key) in self.keys.iter().enumerate() {
+            let band = ((f64::from(y_of(key)) - f64::from(self.top)) * self.per_step) as usize;
+            let band = band.min(self.count - 1);
+            if bands.contains(&band) {
+                visit(band - bands.start, end);
+            }
+        }
+    }
+}
+
+/// The ends at each point of some bands.
+#[derive(Default)]
+struct Points {
+    starts: Vec<u32>,
+    ends: Vec<u32>,
+}
+
+impl Points {
+    /// Adds the points of a band. `names` is emptied first.
+    fn find(&mut self, ends: &[u32], keys: &[u64], names: &mut HashMap<u64, u32, Mix>) {
+        names.clear();
+        let before = self.ends.len() as u32;
+        let first = self.starts.len();
+        let point_of: Vec<u32> = ends
+            .iter()
+            .map(|&end| {
+                let fresh = names.len() as u32;
+                let point = *names.entry(keys[end as usize]).or_insert(fresh);
+                if point == fresh {
+                    self.starts.push(0);
+                }
+                self.starts[first + point as usize] += 1;
+                point
+            })
+            .collect();
+        let mut sum = before;
+        for start in &mut self.starts[first..] {
+            sum += std::mem::replace(start, sum);
+        }
+        let mut next = self.starts[first..].to_vec();
+        self.ends.resize(sum as usize, 0);
+        for (&end, &point) in ends.iter().zip(&point_of) {
+            let at = &mut next[point as usize];
+            self.ends[*at as usize] = end;
+            *at += 1;
+        }
+    }
+
+    fn at(&self, point: usize) -> &[u32] {
+        let end = self.starts.get(point + 1).map_or(self.ends.len(), |&end| end as usize);
+        &self.ends[self.starts[point] as usize..end]
     }
 }
 

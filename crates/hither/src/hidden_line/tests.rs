@@ -145,7 +145,7 @@ fn along(oracle: &LineOracle, line: &Line, t: f64) -> f64 {
 }
 
 fn all_lines() -> LineOptions {
-    LineOptions { crease_angle: 0.0, threads: 1, ..LineOptions::default() }
+    LineOptions { crease_angle: 0.0, ..LineOptions::default() }
 }
 
 fn judge(scene: &Scene, view: &View) -> Score {
@@ -235,11 +235,14 @@ fn covers_are_what_rays_count() {
 
 #[test]
 fn threads_and_the_order_of_parts_do_not_change_the_drawing() {
-    for (name, scene) in scenes::bodies() {
+    for (name, scene) in scenes::bodies().into_iter().chain([("many", scenes::many_triangles())]) {
         let view = scenes::views(&scene)[0];
         let draw = |scene: &Scene, threads| {
-            let preparation = Preparation::new(scene, &PrepareOptions::default());
-            preparation.draw(&view, &LineOptions { threads, ..all_lines() }).unwrap()
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let preparation = Preparation::new(scene, &PrepareOptions::default());
+                preparation.draw(&view, &all_lines()).unwrap()
+            })
         };
         let one = draw(&scene, 1);
         let two = draw(&scene, 2);

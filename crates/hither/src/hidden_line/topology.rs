@@ -5,10 +5,15 @@
 //! transparent: they show nothing and hide nothing.
 
 use super::bodies::Bodies;
+use super::crew::Crew;
+use super::grid::{Places, Sorted};
 use super::junctions;
+use super::seams::{Seams, Sides};
 use crate::scene::{AlphaMode, Mesh, Scene};
 use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
+use std::hash::BuildHasher;
+use std::ops::Range;
 
 /// No triangle, or no vertex.
 pub(super) const NONE: u32 = u32::MAX;
@@ -72,25 +77,26 @@ pub(super) struct Topology {
 
 impl Topology {
     /// Finds the edges of `mesh`. `marked` are pairs of its vertices. Cost: linear, and hashing of the
-    /// positions where some occur twice.
-    pub fn of(scene: &Scene, mesh: &Mesh, marked: &[[u32; 2]]) -> Topology {
-        let (positions, name) = weld(&mesh.positions);
+    /// positions.
+    pub fn of(crew: Crew, scene: &Scene, mesh: &Mesh, marked: &[[u32; 2]]) -> Topology {
+        let (positions, name) = weld(crew, &mesh.positions);
         let corner = |v: u32| name.as_ref().map_or(v, |n| n[v as usize]);
-        let mut triangles = Vec::with_capacity(mesh.triangles.len());
-        let mut normals = Vec::with_capacity(mesh.triangles.len());
         let alphas = alphas(scene, mesh);
         let clear = clear(&alphas);
-        for (i, t) in mesh.triangles.iter().enumerate() {
-            let (mut t, normal) = solid(t.map(corner), &positions);
-            if clear.get(i).is_some_and(|&clear| clear) {
-                t = [NONE; 3];
-            }
-            triangles.push(t);
-            normals.push(normal);
-        }
+        let mut triangles: Vec<[u32; 3]> = Vec::new();
+        crew.extend(&mut triangles, mesh.triangles.len(), |i| {
+            let t = mesh.triangles[i].map(corner);
+            let shows = !clear.get(i).is_some_and(|&clear| clear);
+            if shows && is_solid(t, &positions) { t } else { [NONE; 3] }
+        });
+        let mut normals = Vec::new();
+        crew.extend(&mut normals, triangles.len(), |i| match triangles[i] {
+            [NONE, ..] => Vec3::ZERO,
+            t => across(t, &positions).normalize_or_zero().as_vec3(),
+        });
         let mut topology = Topology {
-            neighbours: vec![[NONE; 3]; triangles.len()],
-            flips: vec![0; triangles.len()],
+            neighbours: Vec::new(),
+            flips: Vec::new(),
             edges: Vec::new(),
             bodies: Bodies::default(),
             abutting: HashSet::default(),
@@ -102,15 +108,11 @@ impl Topology {
             triangles,
         };
         let materials = materials(mesh);
-        topology.find_edges(&normals, &materials);
+        topology.find_edges(crew, &normals, &materials);
         if topology.drop_twins() {
-            topology.edges.clear();
-            topology.neighbours.fill([NONE; 3]);
-            topology.flips.fill(0);
-            topology.find_edges(&normals, &materials);
+            topology.find_edges(crew, &normals, &materials);
         }
-        topology.bodies =
-            Bodies::find(&topology.positions, &topology.triangles, &topology.neighbours, &topology.flips);
+        topology.bodies = Bodies::find(crew, &topology);
         junctions::mend(&mut topology, &normals, &materials);
         let marked: Vec<[u32; 2]> = marked.iter().map(|&[a, b]| [corner(a), corner(b)]).collect();
         topology.mark(&marked, &mesh.lines);
@@ -124,39 +126,16 @@ impl Topology {
         color * self.tints.get(triangle as usize).copied().unwrap_or(Vec3::ONE)
     }
 
-    /// Half-edges sorted by their smaller vertex (counting), then by the larger: runs are edges.
-    fn find_edges(&mut self, normals: &[Vec3], materials: &[u32]) {
-        let mut starts = vec![0u32; self.positions.len() + 1];
-        let sides = |t: &[u32; 3]| [ordered(t[0], t[1]), ordered(t[1], t[2]), ordered(t[2], t[0])];
-        for t in self.triangles.iter().filter(|t| t[0] != NONE) {
-            for [low, _] in sides(t) {
-                starts[low as usize + 1] += 1;
-            }
-        }
-        for v in 1..starts.len() {
-            starts[v] += starts[v - 1];
-        }
-        let mut halves = vec![(0u32, 0u32); starts[self.positions.len()] as usize];
-        let mut next = starts.clone();
-        for (i, t) in self.triangles.iter().enumerate().filter(|(_, t)| t[0] != NONE) {
-            for (k, [low, high]) in sides(t).into_iter().enumerate() {
-                let at = &mut next[low as usize];
-                halves[*at as usize] = (high, (i * 3 + k) as u32);
-                *at += 1;
-            }
-        }
-        self.edges.reserve_exact(halves.len() / 2 + halves.len() / 16);
-        for low in 0..self.positions.len() {
-            let run = &mut halves[starts[low] as usize..starts[low + 1] as usize];
-            run.sort_unstable();
-            let mut rest = &run[..];
-            while let Some(&(high, _)) = rest.first() {
-                let count = rest.iter().take_while(|h| h.0 == high).count();
-                let (same, others) = rest.split_at(count);
-                self.add_edge([low as u32, high], same, normals, materials);
-                rest = others;
-            }
-        }
+    /// Finds all edges, and who is whose neighbour.
+    fn find_edges(&mut self, crew: Crew, normals: &[Vec3], materials: &[u32]) {
+        let sorted = Sorted::new(crew, self.positions.len(), 1, &Sides(&self.triangles));
+        let seams = Seams::new(&self.triangles, normals, materials);
+        let found =
+            crew.map(crew.shares(self.positions.len(), 1), |vertices| seams.edges_from(vertices, &sorted));
+        (self.neighbours, self.flips) = seams.close();
+        let mut found = found.into_iter();
+        self.edges = found.next().unwrap_or_default();
+        found.for_each(|more| self.edges.extend(more));
     }
 
     /// Marks edges: those between pairs of vertices, and those that lines run along. Other lines become edges
@@ -219,45 +198,23 @@ impl Topology {
         }
         found
     }
-
-    fn add_edge(&mut self, vertices: [u32; 2], halves: &[(u32, u32)], normals: &[Vec3], materials: &[u32]) {
-        let triangle = |at: usize| halves.get(at).map_or(NONE, |h| h.1 / 3);
-        let (a, b) = (triangle(0), triangle(1));
-        let mut edge = Edge { vertices, triangles: [a, b], bend: 2.0, traits: 0 };
-        if halves.len() > 2 {
-            edge.traits |= trait_of::NON_MANIFOLD;
-        } else if b != NONE {
-            let (ka, kb) = (halves[0].1 % 3, halves[1].1 % 3);
-            let forward = |t: u32, k: u32| self.triangles[t as usize][k as usize] == vertices[0];
-            let flipped = forward(a, ka) == forward(b, kb);
-            let sign = if flipped { -1.0 } else { 1.0 };
-            // From the difference, not from the product: that would lose small angles.
-            edge.bend = (normals[a as usize] - sign * normals[b as usize]).length_squared() * 0.5;
-            edge.traits |= if flipped { trait_of::FLIPPED } else { 0 };
-            if !materials.is_empty() && materials[a as usize] != materials[b as usize] {
-                edge.traits |= trait_of::BORDER;
-            }
-            self.neighbours[a as usize][ka as usize] = b;
-            self.neighbours[b as usize][kb as usize] = a;
-            self.flips[a as usize] |= u8::from(flipped) << ka;
-            self.flips[b as usize] |= u8::from(flipped) << kb;
-        }
-        self.edges.push(edge);
-    }
 }
 
 pub(super) fn ordered(a: u32, b: u32) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// The corners, or [`NONE`] where they lie on a line or two are the same; and the unit normal, or zero.
-fn solid(t: [u32; 3], positions: &[Vec3]) -> ([u32; 3], Vec3) {
-    let [a, b, c] = t.map(|v| positions[v as usize].as_dvec3());
-    let normal = (b - a).cross(c - a);
-    if normal == DVec3::ZERO || t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
-        return ([NONE; 3], Vec3::ZERO);
-    }
-    (t, normal.normalize_or_zero().as_vec3())
+/// Twice the area of a triangle, along its normal.
+#[inline(always)]
+fn across(t: [u32; 3], positions: &[Vec3]) -> DVec3 {
+    let at = |v: u32| positions[v as usize].as_dvec3();
+    let a = at(t[0]);
+    (at(t[1]) - a).cross(at(t[2]) - a)
+}
+
+/// Whether a triangle's corners are three, and not on a line.
+fn is_solid(t: [u32; 3], positions: &[Vec3]) -> bool {
+    across(t, positions) != DVec3::ZERO && t[0] != t[1] && t[1] != t[2] && t[2] != t[0]
 }
 
 /// Equal for equal positions; zero has one sign.
@@ -266,22 +223,67 @@ fn key(p: &Vec3) -> [u32; 3] {
 }
 
 /// Distinct positions, and for each vertex its position's number; `None` where all are distinct.
-fn weld(positions: &[Vec3]) -> (Vec<Vec3>, Option<Vec<u32>>) {
-    // Sorting what is distinct anyway would cost more than drawing it: look for twins in a table of
-    // fingerprints first.
-    let mut seen: HashMap<[u32; 3], u32, Mix> = HashMap::with_capacity_and_hasher(positions.len(), Mix);
-    let mut distinct = Vec::with_capacity(positions.len());
-    let mut name = Vec::with_capacity(positions.len());
-    for p in positions {
-        let fresh = distinct.len() as u32;
-        let found = *seen.entry(key(p)).or_insert(fresh);
-        if found == fresh {
-            distinct.push(*p + 0.0);
-        }
-        name.push(found);
+fn weld(crew: Crew, positions: &[Vec3]) -> (Vec<Vec3>, Option<Vec<u32>>) {
+    let twins = twins(crew, positions);
+    if twins.is_empty() {
+        return (positions.iter().map(|p| *p + 0.0).collect(), None);
     }
-    let changed = distinct.len() != positions.len();
-    (distinct, changed.then_some(name))
+    let mut name = vec![NONE; positions.len()];
+    for (twin, first) in twins {
+        name[twin as usize] = first;
+    }
+    let mut distinct = Vec::new();
+    for (v, p) in positions.iter().enumerate() {
+        name[v] = match name[v] {
+            NONE => {
+                distinct.push(*p + 0.0);
+                distinct.len() as u32 - 1
+            }
+            first => name[first as usize],
+        };
+    }
+    (distinct, Some(name))
+}
+
+/// Vertices at the same position as one before, and the first there.
+fn twins(crew: Crew, positions: &[Vec3]) -> Vec<(u32, u32)> {
+    let places = Hashed { positions, count: positions.len().div_ceil(4096).next_power_of_two() };
+    let sorted = Sorted::new(crew, places.count, 1, &places);
+    let found = crew.map_with(crew.ranges(places.count, 4), HashMap::default, |seen, cells| {
+        let mut twins = Vec::new();
+        for cell in cells {
+            let seen: &mut HashMap<[u32; 3], u32, Mix> = seen;
+            seen.clear();
+            for &v in sorted.in_cell(cell) {
+                let first = *seen.entry(key(&positions[v as usize])).or_insert(v);
+                if first != v {
+                    twins.push((v, first));
+                }
+            }
+        }
+        twins
+    });
+    found.concat()
+}
+
+/// Vertices in cells by a hash of their position; so few in each that a table of them fits the processor's caches.
+struct Hashed<'a> {
+    positions: &'a [Vec3],
+    /// A power of two.
+    count: usize,
+}
+
+impl Places for Hashed<'_> {
+    #[inline(always)]
+    fn visit(&self, cells: &Range<usize>, mut visit: impl FnMut(usize, usize)) {
+        for (v, p) in self.positions.iter().enumerate() {
+            // The table inside a cell uses the ends of the hash.
+            let cell = (Mix.hash_one(key(p)) >> 20) as usize & (self.count - 1);
+            if cells.contains(&cell) {
+                visit(cell - cells.start, v);
+            }
+        }
+    }
 }
 
 /// A fast hash for coordinates. A file made to collide slows itself down, and nothing else.
@@ -291,7 +293,7 @@ pub(super) struct Mix;
 /// State of [`Mix`].
 pub(super) struct Mixer(u64);
 
-impl std::hash::BuildHasher for Mix {
+impl BuildHasher for Mix {
     type Hasher = Mixer;
     fn build_hasher(&self) -> Mixer {
         Mixer(0)
@@ -401,7 +403,7 @@ mod tests {
             primitives: vec![Primitive { triangles: 0..triangles.len() as u32, material: None }],
             ..Mesh::default()
         };
-        Topology::of(&Scene::new("t"), &mesh, &[[0, 1]])
+        Topology::of(Crew { threads: 1 }, &Scene::new("t"), &mesh, &[[0, 1]])
     }
 
     #[test]

@@ -77,7 +77,6 @@ impl Arguments {
             sections: self.cut.clone(),
             faces: self.faces.map(Faces::color),
             hatch: self.hatch,
-            threads: usize::from(self.threads),
         }
     }
 }

@@ -24,6 +24,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let verbosity = arguments.report.verbosity();
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
     check_outputs(arguments)?;
+    // All that follows is done in this pool; it can have been made before only with as many threads.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.into()).build_global();
 
     let start = Instant::now();
     let mut scene = source::open(&arguments.scene, verbosity)?;

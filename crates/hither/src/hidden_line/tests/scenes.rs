@@ -48,6 +48,20 @@ pub fn ball(scene: &mut Scene, name: &str, center: DVec3, radius: f64, rows: u32
     add(scene, name, positions, triangles, Transform::default());
 }
 
+/// So many triangles that threads share them: two balls that meet, one of them of twice as many parts, and
+/// vertices that occur twice.
+pub fn many_triangles() -> Scene {
+    let mut scene = Scene::new("many");
+    ball(&mut scene, "fine", DVec3::ZERO, 1.0, 60);
+    ball(&mut scene, "coarse", DVec3::new(0.7, 0.4, 0.5), 0.8, 40);
+    let mesh = &mut scene.meshes[1];
+    let at = |v: u32| mesh.positions[v as usize];
+    mesh.positions = mesh.triangles.iter().flatten().map(|&v| at(v)).collect();
+    let count = mesh.triangles.len() as u32;
+    mesh.triangles = (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    scene
+}
+
 /// Named scenes of bodies.
 pub fn bodies() -> Vec<(&'static str, Scene)> {
     let mut scenes = Vec::new();
