@@ -47,16 +47,25 @@ pub struct ProjectedBoxes {
 
 impl BoxSet {
     /// Prepares `at` for boxes whose coordinates are at most `reach` in magnitude.
+    // Called from code for one instruction set, into which closures would not be inlined.
+    #[inline(never)]
     pub fn new(at: &ScreenFromObject, reach: [f64; 3]) -> BoxSet {
-        let pixels = |r: [f64; 4]| r.map(|c| c / 256.0);
-        let rows = [pixels(at.x), pixels(at.y), at.w, at.d];
-        let error = rows.map(|r| {
-            let size = r[0].abs() * reach[0] + r[1].abs() * reach[1] + r[2].abs() * reach[2] + r[3].abs();
-            (size * 8.0 / f64::from(1 << 24)) as f32 * 1.000_001
-        });
-        let [x, y, w, d] = rows.map(|r| r.map(|c| c as f32));
+        let mut rows = [at.x, at.y, at.w, at.d];
+        let (mut rounded, mut error) = ([[0f32; 4]; 4], [0f32; 4]);
+        for (k, row) in rows.iter_mut().enumerate() {
+            for (c, rounded) in row.iter_mut().zip(&mut rounded[k]) {
+                if k < 2 {
+                    *c *= 1.0 / 256.0;
+                }
+                *rounded = *c as f32;
+            }
+            let [x, y, z, w] = *row;
+            let size = x.abs() * reach[0] + y.abs() * reach[1] + z.abs() * reach[2] + w.abs();
+            error[k] = (size * 8.0 / f64::from(1 << 24)) as f32 * 1.000_001;
+        }
+        let [x, y, w, d] = rounded;
         // Squares of nothing are taken here; quotients and margins stay below 1e38 under this bound.
-        let in_range = error.iter().all(|e| *e < 1e25);
+        let in_range = error[0] < 1e25 && error[1] < 1e25 && error[2] < 1e25 && error[3] < 1e25;
         BoxSet { x, y, w, d, error, perspective: at.perspective, in_range }
     }
 }

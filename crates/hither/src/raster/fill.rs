@@ -5,22 +5,20 @@
 //! medium  tiles → 16 blocks each: edges and z-pyramid → masks of touched and of covered blocks
 //! small   (up to 2×2 blocks) straight to blocks
 //! block   16 pixels: edges, depth, compare, write; ties to the smaller id
+//! cover   a whole tile that is still empty: depth, write
 //! ```
 //!
-//! *Coverage.* An edge function is `E = A·(X − x) + B·(Y − y) + bias` on snapped coordinates, and a pixel
-//! is inside where `E ≥ 0` for all three; `bias` is −1 on edges that are neither top nor left, else 0.
-//! At pixel centres `X` steps by 256, so `e = ⌊E / 256⌋ = A·px + B·py + C` has the same sign and exact
-//! integer steps. `C` needs 64 bits; within a tile the steps need 28, so a tile's origin is saturated to
-//! ±2³⁰ without changing a sign.
+//! See `coverage` for the edges, `paint` for the depths.
 
 use super::clip::clip;
-use super::paint::{COLUMN, How, Paint, ROW, fill_block};
+use super::coverage::Coverage;
+use super::paint::{How, Paint, fill_block};
 use super::pyramid::{Rect, Target, cell_mask};
 use super::setup::{ScreenTriangle, TriangleBlock, set_up};
 use super::small::{fill_small, fill_tiny, is_small};
 use super::transform::ScreenFromObject;
 use crate::conventions::SurfaceId;
-use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// How a block of triangles is drawn.
 pub struct Drawing<'a> {
@@ -161,60 +159,9 @@ pub(super) struct Filled {
     pub wrote: bool,
 }
 
-/// An edge as a function of window pixels: inside where `a·x + b·y + c ≥ 0`.
-#[derive(Clone, Copy)]
-struct Edge {
-    a: i32,
-    b: i32,
-    c: i64,
-}
-
-impl Edge {
-    #[inline(always)]
-    fn at(&self, x: i32, y: i32) -> i64 {
-        i64::from(self.a) * i64::from(x) + i64::from(self.b) * i64::from(y) + self.c
-    }
-
-    /// The value at a window pixel, saturated so that a tile's steps cannot overflow.
-    #[inline(always)]
-    fn at_saturated(&self, x: i32, y: i32) -> i32 {
-        self.at(x, y).clamp(-(1 << 30), (1 << 30) - 1) as i32
-    }
-
-    /// Largest step from a cell's origin pixel to one of its pixels.
-    #[inline(always)]
-    fn reach_up(&self, last: i32) -> i32 {
-        (self.a.max(0) + self.b.max(0)) * last
-    }
-
-    /// Smallest (most negative) such step.
-    #[inline(always)]
-    fn reach_down(&self, last: i32) -> i32 {
-        (self.a.min(0) + self.b.min(0)) * last
-    }
-}
-
-#[inline(always)]
-fn edges(t: &ScreenTriangle, target: &Target) -> [Edge; 3] {
-    [edge(t, target, 0, 1), edge(t, target, 1, 2), edge(t, target, 2, 0)]
-}
-
-#[inline(always)]
-fn edge(t: &ScreenTriangle, target: &Target, i: usize, j: usize) -> Edge {
-    let (dx, dy) = (t.x[j] - t.x[i], t.y[j] - t.y[i]);
-    let (a, b) = (-dy, dx);
-    // Clockwise on a y-down screen: left edges go up, top edges go right.
-    let owned = dy < 0 || (dy == 0 && dx > 0);
-    let x = i64::from(128 + 256 * target.left - t.x[i]);
-    let y = i64::from(128 + 256 * target.top - t.y[i]);
-    let e = i64::from(a) * x + i64::from(b) * y - i64::from(!owned);
-    Edge { a, b, c: e >> 8 }
-}
-
 /// A triangle while it is filled: everything that stays the same from block to block.
 struct Filling<S: Simd> {
-    edges: [Edge; 3],
-    edge_steps: [i32x16<S>; 3],
+    coverage: Coverage<S>,
     paint: Paint<S>,
     /// What the plane rises at most from a block's first pixel to another.
     block_rise: f32,
@@ -240,20 +187,9 @@ fn fill<S: Simd>(
     how: How,
     is_hole: &mut dyn FnMut(i32, i32) -> bool,
 ) -> Filled {
-    let edges = edges(t, target);
-    let column = i32x16::from_slice(simd, &COLUMN);
-    let row = i32x16::from_slice(simd, &ROW);
     let paint = Paint::new(simd, target, t, how);
-    let mut filling = Filling {
-        edges,
-        edge_steps: [
-            column * edges[0].a + row * edges[0].b,
-            column * edges[1].a + row * edges[1].b,
-            column * edges[2].a + row * edges[2].b,
-        ],
-        block_rise: paint.plane_rise(3.0),
-        paint,
-    };
+    let block_rise = paint.plane_rise(3.0);
+    let mut filling = Filling { coverage: Coverage::new(simd, t, target), paint, block_rise };
     fill_cells(simd, target, &mut filling, t.depth_max, &blocks_of(t, target), is_hole);
     let wrote = filling.paint.wrote;
     if wrote {
@@ -310,16 +246,11 @@ fn tiles_of_cell<S: Simd>(
     cell_x: i32,
     cell_y: i32,
 ) -> u32 {
-    // A cell's steps need 30 bits, so edges are taken 1/16 as fine: sums of floors are at most 1 short.
-    let mut outside = i32x16::splat(simd, 0);
-    for k in 0..3 {
-        let (edge, steps) = (&f.edges[k], f.edge_steps[k]);
-        let origin = ((edge.at(cell_x * 64, cell_y * 64) >> 4) + (i64::from(edge.reach_up(15)) >> 4) + 2)
-            .clamp(-(1 << 30), (1 << 30) - 1) as i32;
-        outside |= steps + origin;
-    }
-    let mut tiles = !(outside.simd_lt(i32x16::splat(simd, 0)).to_bitmask() as u32) & 0xFFFF;
+    let mut tiles = f.coverage.of_cell(simd, cell_x * 64, cell_y * 64);
     if f.paint.how.hierarchical {
+        if target.visits.is_some() {
+            target.count_polygon_visit((cell_x * 64, cell_y * 64), 16, tiles);
+        }
         let z = f.paint.plane_at(target, cell_x * 64, cell_y * 64);
         let bound = z + f.paint.plane_rise(15.0) + f.paint.plane_margin(z, 63.0);
         let bounds = (f.paint.depth_steps * 16.0 + bound).min(f32x16::splat(simd, depth_max));
@@ -327,9 +258,6 @@ fn tiles_of_cell<S: Simd>(
             let minima = f32x16::from_slice(simd, minima);
             tiles &= bounds.simd_ge(minima).to_bitmask() as u32;
         }
-    }
-    if target.visits.is_some() && f.paint.how.hierarchical {
-        target.count_polygon_visit((cell_x * 64, cell_y * 64), 16, 0xFFFF);
     }
     tiles
 }
@@ -346,48 +274,68 @@ fn fill_tile<S: Simd>(
 ) {
     let tile = tile_y as usize * target.tiles_x + tile_x as usize;
     let (x, y) = (tile_x * 16, tile_y * 16);
-    let zero = i32x16::splat(simd, 0);
-    let (mut outside, mut partial) = (zero, zero);
-    let mut at_blocks = [[0i32; 16]; 3];
-    for (k, at_edge) in at_blocks.iter_mut().enumerate() {
-        let (edge, steps) = (&f.edges[k], f.edge_steps[k]);
-        // Saturated at the tile's origin, and steps within a tile need 28 bits: signs stay right.
-        let at = (steps << 2) + edge.at_saturated(x, y);
-        outside |= at + edge.reach_up(3);
-        partial |= at + edge.reach_down(3);
-        at.store_slice(at_edge);
+    let covers = f.coverage.of_tile(simd, x, y);
+    let mut blocks = covers.met;
+    if blocks == 0 {
+        return;
     }
-    let mut blocks = !(outside.simd_lt(zero).to_bitmask() as u32) & 0xFFFF;
-    let whole = !(partial.simd_lt(zero).to_bitmask() as u32);
     let origins = f.paint.plane_at_blocks(simd, target, x, y);
     if f.paint.how.hierarchical {
         let bounds = (origins + f.paint.plane_margins(simd, origins) + f.block_rise)
             .min(f32x16::splat(simd, depth_max));
         let minima = f32x16::from_slice(simd, target.block_minima(tile));
-        blocks &= bounds.simd_ge(minima).to_bitmask() as u32;
         if target.visits.is_some() {
-            target.count_polygon_visit((x, y), 4, 0xFFFF);
+            target.count_polygon_visit((x, y), 4, blocks);
+        }
+        blocks &= bounds.simd_ge(minima).to_bitmask() as u32;
+        if blocks == 0 {
+            return;
         }
     }
+    if covers.whole == 0xFFFF && f.paint.can_cover() && target.is_fresh(tile) {
+        cover_tile(simd, target, f, tile, origins);
+        return;
+    }
+    target.touch(tile);
     let mut at_origins = [0f32; 16];
     origins.store_slice(&mut at_origins);
     let mut raised = false;
     while blocks != 0 {
-        let c = blocks.trailing_zeros() as usize;
+        let c = blocks.trailing_zeros() as usize & 15;
         blocks &= blocks - 1;
-        let covered = if whole & (1 << c) != 0 {
-            0xFFFF
-        } else {
-            let mut outside = zero;
-            for (steps, at) in f.edge_steps.iter().zip(&at_blocks) {
-                outside |= *steps + at[c];
-            }
-            !(outside.simd_lt(zero).to_bitmask() as u32) & 0xFFFF
-        };
+        let covered = f.coverage.of_block(simd, &covers, c);
         let corner = (x + (c as i32 & 3) * 4, y + (c as i32 >> 2) * 4);
         raised |= fill_block(simd, target, &mut f.paint, tile, c, corner, at_origins[c], covered, is_hole);
     }
     if raised {
+        target.mark_stale(tile);
+    }
+}
+
+/// Writes a tile that nothing was drawn in and that the triangle covers whole: nothing is read or compared.
+#[inline(always)]
+fn cover_tile<S: Simd>(simd: S, target: &mut Target, f: &mut Filling<S>, tile: usize, origins: f32x16<S>) {
+    let (low, high) = (f32x16::splat(simd, f.paint.depth_min), f32x16::splat(simd, f.paint.depth_max));
+    let mut at_origins = [0f32; 16];
+    origins.store_slice(&mut at_origins);
+    let blocks = &mut target.depth[tile * 16..tile * 16 + 16];
+    for c in 0..16 {
+        let z = (f.paint.depth_steps + at_origins[c]).max(low).min(high);
+        z.store_slice(&mut blocks[c].0);
+    }
+    target.block_id[tile * 16..tile * 16 + 16].copy_from_slice(&[f.paint.slot; 16]);
+    target.touched[tile] = true;
+    target.counters.pixels_written += 256;
+    f.paint.wrote = true;
+    if target.visits.is_some() {
+        let (x, y) = ((tile % target.tiles_x) as i32 * 16, (tile / target.tiles_x) as i32 * 16);
+        for c in 0..16 {
+            target.count_polygon_visit((x + c % 4 * 4, y + c / 4 * 4), 1, 0xFFFF);
+        }
+    }
+    if f.paint.how.hierarchical {
+        let least = (origins + f.paint.least_step).max(low).min(high);
+        least.store_slice(&mut target.levels[0].min[tile].0);
         target.mark_stale(tile);
     }
 }

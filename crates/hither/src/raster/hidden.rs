@@ -27,31 +27,98 @@ impl Target {
             return true;
         }
         let rect = [left, top, right, bottom];
-        let extent = (right - left).max(bottom - top) as u32;
-        if extent < 16 {
-            // Most boxes are small: they ask the minima of at most 2×2 tiles, which are never stale.
-            for tile_y in (top >> 4)..=(bottom >> 4) {
-                for tile_x in (left >> 4)..=(right >> 4) {
-                    if self.shows_in_tile(simd, tile_x, tile_y, rect, depth) {
-                        return false;
-                    }
-                }
-            }
-            return true;
+        if (right >> 2) - (left >> 2) < 2 && (bottom >> 2) - (top >> 2) < 2 {
+            // What is far away is this small: it asks the pixels themselves.
+            return !self.shows_in_blocks(simd, rect, depth);
         }
         // Finest level at which the rectangle meets at most 2×2 parents: parents at level k have side
         // 4^(k+2), and an extent below 4^(k+2) touches at most two of them.
+        let extent = (right - left).max(bottom - top) as u32;
         let log4 = (31 - (extent | 15).leading_zeros()) / 2;
-        let top_level = (log4 as usize - 1).min(self.levels.len() - 1);
-        let shift = 2 * (top_level as u32 + 2);
-        for parent_y in (top >> shift)..=(bottom >> shift) {
-            for parent_x in (left >> shift)..=(right >> shift) {
-                if self.shows_in(simd, top_level, parent_x as usize, parent_y as usize, rect, depth) {
+        let level = (log4 as usize - 1).min(self.levels.len() - 1);
+        let parents = self.look_at_parents(simd, level, rect, depth);
+        if parents.shown {
+            return false;
+        }
+        let shift = 2 * (level as u32 + 2);
+        for (i, &open) in (0i32..).zip(&parents.open) {
+            let (px, py) = ((left >> shift) + (i & 1), (top >> shift) + (i >> 1));
+            let mut rest = open;
+            while rest != 0 {
+                let c = rest.trailing_zeros() as i32;
+                rest &= rest - 1;
+                let (x, y) = (px * 4 + (c & 3), py * 4 + (c >> 2));
+                let shows = if level == 0 {
+                    let tile = py as usize * self.tiles_x + px as usize;
+                    self.pixels_at_or_behind(simd, tile, c as usize, x, y, rect, depth) != 0
+                } else {
+                    self.shows_in(simd, level - 1, x as usize, y as usize, rect, depth)
+                };
+                if shows {
                     return false;
                 }
             }
         }
         true
+    }
+
+    /// Whether some pixel of `[left, top, right, bottom]` (inclusive), which meets at most 2×2 blocks, holds
+    /// `depth` or something farther. Without a branch: which blocks there are cannot be foreseen.
+    #[inline(always)]
+    fn shows_in_blocks<S: Simd>(&mut self, simd: S, rect: [i32; 4], depth: f32) -> bool {
+        let [left, top, right, bottom] = rect;
+        let (bx, by) = ([left >> 2, right >> 2], [top >> 2, bottom >> 2]);
+        let columns = span(left - bx[0] * 4, right + 1 - bx[0] * 4);
+        let rows = span(top - by[0] * 4, bottom + 1 - by[0] * 4);
+        let depth = f32x16::splat(simd, depth);
+        let mut shown = 0;
+        for i in 0..4 {
+            // Where there are fewer than four, one comes again, and none of its pixels is asked.
+            let (x, y) = (bx[i & 1], by[i >> 1]);
+            let pixels = sixteen(columns >> (4 * (i & 1)), rows >> (4 * (i >> 1)));
+            let tile = (y >> 2) as usize * self.tiles_x + (x >> 2) as usize;
+            let untouched = if self.touched[tile] { 0 } else { 0xFFFF };
+            let block = tile * 16 + ((y & 3) * 4 + (x & 3)) as usize;
+            let values = f32x16::from_slice(simd, &self.depth[block].0);
+            shown |= (values.simd_le(depth).to_bitmask() as u32 | untouched) & pixels;
+            if let Some(visits) = &mut self.visits {
+                add_visits(&mut visits.cubes, self.width, self.height, (x * 4, y * 4), 1, pixels);
+            }
+        }
+        shown != 0
+    }
+
+    /// What the children of the at most 2×2 parents at `level` that a rectangle meets say of it at a depth.
+    #[inline(always)]
+    fn look_at_parents<S: Simd>(&mut self, simd: S, level: usize, rect: [i32; 4], depth: f32) -> Parents {
+        let shift = 2 * (level as u32 + 1);
+        let up = (1i32 << shift) - 1;
+        let [left, top, right, bottom] = rect;
+        let px = [left >> (shift + 2), right >> (shift + 2)];
+        let py = [top >> (shift + 2), bottom >> (shift + 2)];
+        let (x, y) = (px[0] * 4, py[0] * 4);
+        let columns = span((left >> shift) - x, (right >> shift) + 1 - x);
+        let rows = span((top >> shift) - y, (bottom >> shift) + 1 - y);
+        let whole_columns = span(((left + up) >> shift) - x, ((right + 1) >> shift) - x);
+        let whole_rows = span(((top + up) >> shift) - y, ((bottom + 1) >> shift) - y);
+        let depth = f32x16::splat(simd, depth);
+        let mut parents = Parents { open: [0; 4], shown: false };
+        for i in 0..4 {
+            // Where there are fewer than four, one comes again, and none of its children is asked.
+            let parent = py[i >> 1] as usize * self.levels[level].columns + px[i & 1] as usize;
+            if level > 0 && self.levels[level].stale[parent] != 0 {
+                self.refresh(simd, level, parent);
+            }
+            let (right, down) = (4 * (i & 1), 4 * (i >> 1));
+            let meets = sixteen(columns >> right, rows >> down);
+            if self.visits.is_some() {
+                self.count_cube_visit(level, parent, meets);
+            }
+            let values = f32x16::from_slice(simd, &self.levels[level].min[parent].0);
+            parents.open[i] = values.simd_le(depth).to_bitmask() as u32 & meets;
+            parents.shown |= parents.open[i] & sixteen(whole_columns >> right, whole_rows >> down) != 0;
+        }
+        parents
     }
 
     /// A first, cheap look: whether the one pyramid sample around `[left, top, right, bottom]` (inclusive, in
@@ -142,33 +209,6 @@ impl Target {
         }
         let side = 4i32 << (2 * level);
         bits & outline.cells(simd, (px as i32 * side * 4) as f32, (py as i32 * side * 4) as f32, side)
-    }
-
-    /// Whether some pixel of `[left, top, right, bottom]` (inclusive) inside this tile holds `depth` or
-    /// something farther.
-    #[inline(always)]
-    fn shows_in_tile<S: Simd>(
-        &mut self,
-        simd: S,
-        tile_x: i32,
-        tile_y: i32,
-        rect: [i32; 4],
-        depth: f32,
-    ) -> bool {
-        let mut bits = match self.open_children(simd, 0, tile_x as u32, tile_y as u32, rect, depth) {
-            Children::Shown => return true,
-            Children::Open(bits) => bits,
-        };
-        let tile = tile_y as usize * self.tiles_x + tile_x as usize;
-        while bits != 0 {
-            let c = bits.trailing_zeros() as i32;
-            bits &= bits - 1;
-            let (bx, by) = (tile_x * 4 + (c & 3), tile_y * 4 + (c >> 2));
-            if self.pixels_at_or_behind(simd, tile, c as usize, bx, by, rect, depth) != 0 {
-                return true;
-            }
-        }
-        false
     }
 
     /// Whether some pixel of `[left, top, right, bottom]` (inclusive) inside this parent cell holds
@@ -308,6 +348,30 @@ impl Target {
     }
 }
 
+/// What the children of up to 2×2 parents say of a rectangle at a depth.
+struct Parents {
+    /// Of each parent, the children that meet the rectangle and hold the depth or something farther.
+    open: [u32; 4],
+    /// Whether one of them lies wholly inside the rectangle: its minimum is a pixel of it.
+    shown: bool,
+}
+
+/// Bits `from..to`, none where that is empty.
+#[inline(always)]
+fn span(from: i32, to: i32) -> u32 {
+    (1u32 << to.max(from)) - (1 << from)
+}
+
+/// Bits of the children of a 4×4 group in these of its columns and rows: the lowest four bits of each.
+#[inline(always)]
+fn sixteen(columns: u32, rows: u32) -> u32 {
+    const ROWS: [u32; 16] = [
+        0x0000, 0x000F, 0x00F0, 0x00FF, 0x0F00, 0x0F0F, 0x0FF0, 0x0FFF, 0xF000, 0xF00F, 0xF0F0, 0xF0FF,
+        0xFF00, 0xFF0F, 0xFFF0, 0xFFFF,
+    ];
+    ((columns & 15) * 0x1111) & ROWS[rows as usize & 15]
+}
+
 /// What a parent's children say of a rectangle at a depth.
 enum Children {
     /// It shows in one of them.
@@ -315,3 +379,6 @@ enum Children {
     /// It may show in these.
     Open(u32),
 }
+
+#[cfg(test)]
+mod tests;

@@ -24,6 +24,7 @@
 mod box_corners;
 mod boxes;
 mod clip;
+mod coverage;
 mod definitive;
 mod fill;
 mod guard;

@@ -51,6 +51,12 @@ impl<S: Simd> Paint<S> {
         }
     }
 
+    /// Whether every pixel of an empty block that the triangle covers is written.
+    #[inline(always)]
+    pub fn can_cover(&self) -> bool {
+        !self.how.masked && self.depth_min > 0.0
+    }
+
     /// The plane at a window pixel, rounded once. Blocks pass their first pixel.
     ///
     /// The bits must not depend on the window: `plane` is shifted by whole multiples of 16 pixels, which
@@ -96,7 +102,7 @@ impl<S: Simd> Paint<S> {
 }
 
 #[expect(clippy::too_many_arguments, reason = "the inner step of two loops, split off to be written once")]
-/// Writes the pixels of block `block` of `tile` that are `covered` and nearer than what they hold; `origin` is
+/// Writes the pixels of block `block` of `tile`, which is touched, that are `covered` and nearer than what they hold; `origin` is
 /// the plane at the block's first pixel, window pixel `corner`. Returns whether the block's minimum rose: what
 /// lies above it in the pyramid is then to be marked stale.
 #[inline(always)]
@@ -117,7 +123,6 @@ pub(super) fn fill_block<S: Simd>(
     if covered == 0 {
         return false;
     }
-    target.touch(tile);
     let at = tile * 16 + block;
     let z = (paint.depth_steps + origin)
         .max(f32x16::splat(simd, paint.depth_min))

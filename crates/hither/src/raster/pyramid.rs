@@ -254,11 +254,20 @@ impl Target {
         }
     }
 
+    /// Whether nothing was drawn in a tile that lies wholly in the window.
+    #[inline(always)]
+    pub(super) fn is_fresh(&self, tile: usize) -> bool {
+        let (x, y) = ((tile % self.tiles_x) as i32, (tile / self.tiles_x) as i32);
+        !self.touched[tile] && x * 16 + 16 <= self.width && y * 16 + 16 <= self.height
+    }
+
     #[inline(never)]
     fn initialise(&mut self, tile: usize) {
         self.touched[tile] = true;
         let blocks = &mut self.depth[tile * 16..tile * 16 + 16];
         blocks.fill(Sixteen([0.0; 16]));
+        // What the pixels held in an earlier frame is of no use, and need not be fetched.
+        self.block_id[tile * 16..tile * 16 + 16].fill(0);
         let x = (tile % self.tiles_x) as i32 * 16;
         let y = (tile / self.tiles_x) as i32 * 16;
         if x + 16 > self.width || y + 16 > self.height {

@@ -60,6 +60,7 @@ pub(super) fn fill_tiny<S: Simd>(
             continue;
         }
         rasterised = true;
+        target.touch(tile);
         let origin = paint.plane_at(target, bx * 4, by * 4);
         if fill_block(simd, target, &mut paint, tile, block, (bx * 4, by * 4), origin, covered, is_hole) {
             target.mark_stale(tile);
@@ -116,6 +117,7 @@ pub(super) fn fill_small<S: Simd>(
         let covered = !(outside.simd_lt(i32x16::splat(simd, 0)).to_bitmask() as u32) & 0xFFFF;
         let tile = (by >> 2) as usize * target.tiles_x + (bx >> 2) as usize;
         let block = ((by & 3) * 4 + (bx & 3)) as usize;
+        target.touch(tile);
         let origin = paint.plane_at(target, bx * 4, by * 4);
         let corner = (bx * 4, by * 4);
         if fill_block(simd, target, &mut paint, tile, block, corner, origin, covered, is_hole) {

@@ -52,6 +52,7 @@ impl ScreenFromObject {
     }
 
     /// This transform applied after `here_from_inner`.
+    #[inline(never)]
     pub fn after(&self, here_from_inner: &DAffine3) -> ScreenFromObject {
         let m = here_from_inner.matrix3;
         let t = here_from_inner.translation;
