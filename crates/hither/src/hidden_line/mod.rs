@@ -13,7 +13,8 @@
 //!    part of the way. `intersections` adds the lines in which surfaces meet.
 //! 3. `trace`: each line is followed through the grid; `hide` finds the exact part that one triangle hides.
 //!    Signs that decide are exact ([Shewchuk 1997]); end points are crossings of lines, never samples.
-//! 4. `coincident` draws once what lies on one another; `strokes` joins the rest into few long strokes.
+//! 4. `coincident` draws once what lies on one another; `joints` joins the rest into few long strokes, and `strokes`
+//!    puts these into an order.
 //! 5. If they are asked for, `faces` cuts the paper along all visible lines into regions, and finds what each
 //!    of them shows. `caps` closes what section planes open.
 //!
@@ -39,6 +40,7 @@ mod grid;
 mod hatch;
 mod hide;
 mod intersections;
+mod joints;
 mod junctions;
 mod lens;
 mod occluders;

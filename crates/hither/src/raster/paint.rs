@@ -102,9 +102,9 @@ impl<S: Simd> Paint<S> {
 }
 
 #[expect(clippy::too_many_arguments, reason = "the inner step of two loops, split off to be written once")]
-/// Writes the pixels of block `block` of `tile`, which is touched, that are `covered` and nearer than what they hold; `origin` is
-/// the plane at the block's first pixel, window pixel `corner`. Returns whether the block's minimum rose: what
-/// lies above it in the pyramid is then to be marked stale.
+/// Writes the pixels of block `block` of `tile`, which is touched, that are `covered` and nearer than what they
+/// hold; `origin` is the plane at the block's first pixel, window pixel `corner`. Returns whether the block's
+/// minimum rose: what lies above it in the pyramid is then to be marked stale.
 #[inline(always)]
 pub(super) fn fill_block<S: Simd>(
     simd: S,

@@ -24,7 +24,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let verbosity = arguments.report.verbosity();
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
     check_outputs(arguments)?;
-    // All that follows is done in this pool; it can have been made before only with as many threads.
+    // All that follows is done in this pool. Nothing before needs one, so that this cannot come too late.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.into()).build_global();
 
     let start = Instant::now();
