@@ -12,9 +12,16 @@ pub(crate) struct Oddities {
 struct Oddity {
     /// What is met again and again under one heading.
     kind: &'static str,
-    place: String,
+    place: Place,
     message: String,
     count: u64,
+}
+
+#[derive(Debug)]
+enum Place {
+    /// A line of the text, from 1.
+    Line(u64),
+    At(String),
 }
 
 impl Oddities {
@@ -25,15 +32,38 @@ impl Oddities {
         place: impl FnOnce() -> String,
         message: impl FnOnce() -> String,
     ) {
+        self.add(kind, || Place::At(place()), message);
+    }
+
+    /// One more oddity in line `line`, where the kind says it all.
+    pub(crate) fn in_line(&mut self, line: u64, kind: &'static str) {
+        self.in_line_with(line, kind, || kind.to_owned());
+    }
+
+    /// One more of `kind`, in line `line`; `message` is made only for the first.
+    pub(crate) fn in_line_with(&mut self, line: u64, kind: &'static str, message: impl FnOnce() -> String) {
+        self.add(kind, || Place::Line(line), message);
+    }
+
+    fn add(&mut self, kind: &'static str, place: impl FnOnce() -> Place, message: impl FnOnce() -> String) {
         match self.found.iter_mut().find(|o| o.kind == kind) {
             Some(known) => known.count += 1,
             None => self.found.push(Oddity { kind, place: place(), message: message(), count: 1 }),
         }
     }
 
-    /// One more oddity in line `line`, where the kind says it all.
-    pub(crate) fn in_line(&mut self, line: u64, kind: &'static str) {
-        self.note(kind, || format!("line {line}"), || kind.to_owned());
+    /// What was odd about the next piece of the text, which begins after `lines` lines.
+    pub(crate) fn append(&mut self, piece: Oddities, lines: u64) {
+        for mut oddity in piece.found {
+            if let Some(known) = self.found.iter_mut().find(|o| o.kind == oddity.kind) {
+                known.count += oddity.count;
+                continue;
+            }
+            if let Place::Line(line) = &mut oddity.place {
+                *line += lines;
+            }
+            self.found.push(oddity);
+        }
     }
 
     /// Whether nothing was odd.
@@ -43,9 +73,15 @@ impl Oddities {
 
     /// One diagnostic for each kind.
     pub(crate) fn into_diagnostics(self) -> Vec<Diagnostic> {
-        let told = |o: Oddity| match o.count {
-            1 => Diagnostic { place: o.place, message: o.message },
-            more => Diagnostic { place: o.place, message: format!("{} ({more} times)", o.message) },
+        let told = |o: Oddity| {
+            let place = match o.place {
+                Place::Line(line) => format!("line {line}"),
+                Place::At(place) => place,
+            };
+            match o.count {
+                1 => Diagnostic { place, message: o.message },
+                more => Diagnostic { place, message: format!("{} ({more} times)", o.message) },
+            }
         };
         self.found.into_iter().map(told).collect()
     }
@@ -64,5 +100,22 @@ mod tests {
         oddities.note("other", || "here".into(), || "something else".into());
         let told: Vec<String> = oddities.into_diagnostics().iter().map(ToString::to_string).collect();
         assert_eq!(told, ["line 3: a point is left out (5 times)", "here: something else"]);
+    }
+
+    #[test]
+    fn lines_of_a_further_piece_are_counted_on() {
+        let piece = |line| {
+            let mut oddities = Oddities::default();
+            oddities.in_line(line, "a point is left out");
+            oddities
+        };
+        let mut all = Oddities::default();
+        all.append(piece(3), 0);
+        all.append(piece(4), 10);
+        let mut other = Oddities::default();
+        other.in_line(1, "something else");
+        all.append(other, 20);
+        let told: Vec<String> = all.into_diagnostics().iter().map(ToString::to_string).collect();
+        assert_eq!(told, ["line 3: a point is left out (2 times)", "line 21: something else"]);
     }
 }

@@ -1,6 +1,6 @@
 //! Lines, words and numbers of text formats, taken from bytes as they come: no encoding is assumed.
 
-use memchr::memchr2;
+use memchr::{memchr, memchr2, memrchr};
 
 /// Lines of a text, ended by LF, CR or both; the last needs no end.
 pub(crate) struct Lines<'a> {
@@ -10,11 +10,43 @@ pub(crate) struct Lines<'a> {
     joined: Vec<u8>,
 }
 
+/// `bytes` without the mark of UTF-8 that may stand at the beginning of a file.
+pub(crate) fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
+/// `bytes` in `count` pieces of about the same length, each of whole lines that [`Lines::continued`] does not join
+/// with those of the next.
+pub(crate) fn pieces(bytes: &[u8], count: usize) -> Vec<&[u8]> {
+    let mut rest = bytes;
+    let mut pieces = Vec::new();
+    for left in (2..=count).rev() {
+        let piece;
+        (piece, rest) = rest.split_at(end_of_joined_lines(rest, rest.len() / left));
+        pieces.push(piece);
+    }
+    pieces.push(rest);
+    pieces
+}
+
+/// The end of the first line that ends at `from` or later and goes on in no other.
+fn end_of_joined_lines(bytes: &[u8], from: usize) -> usize {
+    let mut from = from;
+    while let Some(length) = memchr(b'\n', &bytes[from..]) {
+        let end = from + length;
+        let start = memrchr(b'\n', &bytes[..end]).map_or(0, |before| before + 1);
+        if bytes[start..end].trim_ascii_end().last() != Some(&b'\\') {
+            return end + 1;
+        }
+        from = end + 1;
+    }
+    bytes.len()
+}
+
 impl<'a> Lines<'a> {
-    /// The lines of `bytes`, without the mark of UTF-8 at their beginning.
+    /// The lines of `bytes`.
     pub(crate) fn plain(bytes: &'a [u8]) -> Lines<'a> {
-        let rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        Lines { rest, number: 0, continues: false, joined: Vec::new() }
+        Lines { rest: bytes, number: 0, continues: false, joined: Vec::new() }
     }
 
     /// As [`Lines::plain`], but a line whose last byte is `\` goes on in the next one, unless it is a comment
@@ -173,7 +205,7 @@ mod tests {
     #[test]
     fn every_line_end_ends_a_line_and_is_counted_once() {
         let expected: Vec<(u64, String)> = vec![(1, "a".into()), (2, "".into()), (3, "b c".into())];
-        for text in ["a\n\nb c", "a\r\n\r\nb c\r\n", "a\r\rb c\r", "\u{feff} a \n\t\nb c  \n"] {
+        for text in ["a\n\nb c", "a\r\n\r\nb c\r\n", "a\r\rb c\r", " a \n\t\nb c  \n"] {
             assert_eq!(lines(text), expected, "{text:?}");
         }
     }

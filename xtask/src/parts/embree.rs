@@ -10,7 +10,8 @@ const LIBRARIES: &[&str] = &["libembree3.so.3", "libembree4.so.4"];
 const INSTALL: &str =
     "install Embree 3 or 4 (Debian: apt-get install libembree-dev), or name its library in HITHER_EMBREE";
 
-/// Runs the tests of `hither-bench` with its feature `embree`.
+/// Runs the peer test of `hither-bench` with its feature `embree`. Of the whole workspace, as the other tests were
+/// built, so that little is built anew.
 pub fn run(job: &mut Job) -> Result<Outcome> {
     if !installed() {
         job.install_packages(&["libembree-dev"]);
@@ -18,7 +19,7 @@ pub fn run(job: &mut Job) -> Result<Outcome> {
     if !installed() {
         return Ok(Outcome::Skipped(INSTALL.into()));
     }
-    job.cargo_test(&["-p", "hither-bench", "--features", "embree"])
+    job.cargo_test(&["--workspace", "--features", "hither-bench/embree", "--test", "peers"])
 }
 
 /// Without the library the tests would pass and have tested nothing.

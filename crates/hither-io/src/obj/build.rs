@@ -43,17 +43,26 @@ pub(super) fn build(statements: Statements, materials: Materials, oddities: &mut
 /// The lines of each part, without those that have no length.
 fn lines(statements: &Statements, oddities: &mut Oddities) -> Vec<Vec<[Vec3; 2]>> {
     let mut lines = vec![Vec::new(); statements.parts.len()];
-    for &(part, ends, line) in &statements.segments {
-        match ends.map(|i| statements.positions.get(i as usize).copied()) {
-            [Some(a), Some(b)] if a.is_finite() && b.is_finite() => {
-                if a != b {
-                    lines[part as usize].push([a, b]);
+    let mut first = 0;
+    for polyline in &statements.polylines {
+        let corners = &statements.line_corners[first..polyline.end as usize];
+        first = polyline.end as usize;
+        for ends in corners.windows(2) {
+            match [ends[0], ends[1]].map(|i| statements.positions.get(i as usize).copied()) {
+                [Some(a), Some(b)] if a.is_finite() && b.is_finite() => {
+                    if a != b {
+                        lines[polyline.part as usize].push([a, b]);
+                    }
                 }
+                [Some(_), Some(_)] => oddities.in_line(
+                    polyline.line.into(),
+                    "a line has a coordinate that is no number and is left out",
+                ),
+                _ => oddities.in_line(
+                    polyline.line.into(),
+                    "a line names a vertex that does not exist and is left out",
+                ),
             }
-            [Some(_), Some(_)] => {
-                oddities.in_line(line.into(), "a line has a coordinate that is no number and is left out");
-            }
-            _ => oddities.in_line(line.into(), "a line names a vertex that does not exist and is left out"),
         }
     }
     lines

@@ -117,7 +117,7 @@ fn library_files(
 /// Appends the materials of one library.
 fn parse(library: &str, bytes: &[u8], stated: &mut Vec<Stated>, oddities: &mut Oddities) {
     let first = stated.len();
-    let mut lines = Lines::continued(bytes);
+    let mut lines = Lines::continued(text::without_mark(bytes));
     let mut number = 0;
     while let Some(line) = lines.next() {
         number += 1;

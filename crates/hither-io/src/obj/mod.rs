@@ -15,6 +15,7 @@
 //! - Faces with an index out of range, or with a coordinate that is no number, are left out likewise.
 
 mod build;
+mod join;
 mod materials;
 mod parse;
 #[cfg(test)]

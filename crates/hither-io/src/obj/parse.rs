@@ -1,21 +1,31 @@
 //! The statements of an OBJ file as flat lists: positions, attributes, and faces with their part and material.
 //!
-//! Nothing is looked up here but names, so a face may come before what it refers to.
+//! Nothing is looked up here but names, so a face may come before what it refers to. A long file is read in
+//! pieces, each by a thread that knows nothing of the others: it counts lines, vertices and names from its own
+//! first on, and [`super::join`] puts the pieces together.
 
+use super::join;
 use crate::oddities::Oddities;
 use crate::srgb;
 use crate::text::{self, Lines, is_blank};
 use glam::{DVec3, Vec2, Vec3, Vec4};
-use std::collections::{HashMap, HashSet};
+use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// No texture coordinate, no normal.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// An index that leads nowhere, whatever the lists hold.
-const NOWHERE: u32 = u32::MAX - 1;
+pub(super) const NOWHERE: u32 = u32::MAX - 1;
+
+/// Of a piece: the material that was in use when it began.
+pub(super) const BEFORE: u32 = u32::MAX - 1;
 
 /// The largest number of things of one kind that can be referred to.
 const MOST: usize = NOWHERE as usize;
+
+/// Bytes that are worth a thread of their own: a millisecond's work, or two.
+const SHORTEST_PIECE: usize = 1 << 19;
 
 /// Indices of a face's corner: position, texture coordinate, normal.
 pub(super) type Corner = [u32; 3];
@@ -37,8 +47,10 @@ pub(super) struct Statements {
     pub(super) faces: Vec<Face>,
     /// Faces of one part with one material, in a row.
     pub(super) runs: Vec<Run>,
-    /// Segments of lines (`l`): the part, the indices of two positions, and where they are in the file.
-    pub(super) segments: Vec<(u32, [u32; 2], u32)>,
+    /// Indices of the positions that all polylines go through.
+    pub(super) line_corners: Vec<u32>,
+    /// Polylines (`l`).
+    pub(super) polylines: Vec<Polyline>,
     /// Names of parts: object, group, or both with a `/` between.
     pub(super) parts: Vec<String>,
     /// Names that `usemtl` gives.
@@ -56,6 +68,14 @@ pub(super) struct Face {
     pub(super) line: u32,
 }
 
+/// A polyline: its corners end here, and begin where those of the one before end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Polyline {
+    pub(super) end: u32,
+    pub(super) line: u32,
+    pub(super) part: u32,
+}
+
 /// Faces from `first_face` up to the next run's.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Run {
@@ -69,64 +89,74 @@ pub(super) struct Run {
 #[derive(Debug)]
 pub(super) struct TooLarge;
 
-/// Where new faces belong.
-struct State {
-    object: String,
-    group: String,
-    material: u32,
+/// The names that a part has its name from; `None` where those hold that held when the piece began.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Names {
+    pub(super) object: Option<String>,
+    /// A new object begins without a group, so where the object is given this is, too.
+    pub(super) group: Option<String>,
+}
+
+/// An index that counts back from the last thing known, and may lead out of its piece.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CountedBack {
+    /// The number among the piece's corners, or corners of polylines.
+    pub(super) corner: usize,
+    /// 0 for a position, 1 for a texture coordinate, 2 for a normal.
+    pub(super) which: usize,
+    /// What it refers to, counted from the piece's first.
+    pub(super) index: i64,
+}
+
+/// What a piece of a file says. Its parts are [`Piece::parts`], not those of its statements.
+#[derive(Debug)]
+pub(super) struct Piece {
+    pub(super) statements: Statements,
+    pub(super) oddities: Oddities,
+    /// Names of its parts.
+    pub(super) parts: Vec<Names>,
+    /// Indices of [`Statements::corners`] that count back.
+    pub(super) corners_back: Vec<CountedBack>,
+    /// Indices of [`Statements::line_corners`] that count back.
+    pub(super) lines_back: Vec<CountedBack>,
+    /// Physical lines.
+    pub(super) lines: u64,
+    /// What is in force at its end.
+    pub(super) names: Names,
+    pub(super) material: u32,
     /// Whether the names have changed since the last face.
     changed: bool,
     /// The part of these names, if it was needed.
     part: Option<u32>,
-    part_of_name: HashMap<String, u32>,
+    part_of_names: HashMap<Names, u32>,
     material_of_name: HashMap<Vec<u8>, u32>,
-    known_libraries: HashSet<Vec<u8>>,
 }
 
-/// Reads all statements. What is left out is noted in `oddities`.
+/// Reads all statements, by several threads where they are many. What is left out is noted in `oddities`.
 pub(super) fn parse(bytes: &[u8], oddities: &mut Oddities) -> Result<Statements, TooLarge> {
-    let mut all = Statements::default();
-    let mut state = State {
-        object: String::new(),
-        group: String::new(),
-        material: NONE,
-        changed: true,
-        part: None,
-        part_of_name: HashMap::new(),
-        material_of_name: HashMap::new(),
-        known_libraries: HashSet::new(),
-    };
-    let mut lines = Lines::continued(bytes);
-    // `number()` borrows what the line borrows.
-    let mut number = 0;
-    while let Some(line) = lines.next() {
-        let line_number = number + 1;
-        match line {
-            [] | [b'#', ..] => {}
-            [b'v', b, rest @ ..] if is_blank(*b) => all.position(rest, line_number, oddities),
-            [b'f', b, rest @ ..] if is_blank(*b) => all.face(rest, line_number, &mut state, oddities),
-            [b'v', b'n', b, rest @ ..] if is_blank(*b) => all.normal(rest),
-            [b'v', b't', b, rest @ ..] if is_blank(*b) => all.uv(rest),
-            _ => all.other(line, line_number, &mut state, oddities),
-        }
-        number = lines.number();
-        if all
-            .corners
-            .len()
-            .max(all.segments.len())
-            .max(all.positions.len())
-            .max(all.uvs.len())
-            .max(all.normals.len())
-            >= MOST
-        {
-            return Err(TooLarge);
-        }
-    }
+    let worthwhile = bytes.len() / SHORTEST_PIECE + 1;
+    parse_in(worthwhile.min(rayon::current_num_threads()), bytes, oddities)
+}
+
+/// As [`parse`], in so many pieces; the answer is the same.
+pub(super) fn parse_in(pieces: usize, bytes: &[u8], oddities: &mut Oddities) -> Result<Statements, TooLarge> {
+    let pieces = text::pieces(text::without_mark(bytes), pieces);
+    let pieces = pieces.into_par_iter().map(Piece::read).collect::<Result<_, _>>()?;
+    let mut all = join::join(pieces, oddities)?;
     all.mend_corners(oddities);
     Ok(all)
 }
 
 impl Statements {
+    /// Refuses more than indices reach.
+    #[inline]
+    pub(super) fn check_counts(&self) -> Result<(), TooLarge> {
+        let most = (self.corners.len().max(self.line_corners.len()).max(self.positions.len()))
+            .max(self.uvs.len())
+            .max(self.normals.len());
+        if most < MOST { Ok(()) } else { Err(TooLarge) }
+    }
+
     fn position(&mut self, mut line: &[u8], number: u64, oddities: &mut Oddities) {
         let mut values = [f32::NAN; 7];
         let mut count = 0;
@@ -171,144 +201,6 @@ impl Statements {
         self.uvs.push(if uv.is_finite() { uv } else { Vec2::ZERO });
     }
 
-    fn face(&mut self, line: &[u8], number: u64, state: &mut State, oddities: &mut Oddities) {
-        let first = self.corners.len();
-        let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
-        let mut rest = line;
-        loop {
-            while let [b, after @ ..] = rest
-                && is_blank(*b)
-            {
-                rest = after;
-            }
-            if rest.first().is_none_or(|&b| b == b'#') {
-                break;
-            }
-            let Some(corner) = corner(&mut rest, counts) else {
-                self.corners.truncate(first);
-                oddities.note(
-                    "corner",
-                    || format!("line {number}"),
-                    || format!("the face {} cannot be read and is left out", text::quoted(line)),
-                );
-                return;
-            };
-            self.corners.push(corner);
-        }
-        if self.corners.len() < first + 3 {
-            self.corners.truncate(first);
-            oddities.in_line(number, "a face has fewer than three corners and is left out");
-            return;
-        }
-        if state.changed {
-            self.begin_run(state);
-        }
-        let line = u32::try_from(number).unwrap_or(u32::MAX);
-        self.faces.push(Face { end: self.corners.len() as u32, line });
-    }
-
-    /// `l`: a line through corners; texture coordinates are of no use to it.
-    fn line(&mut self, line: &[u8], number: u64, state: &mut State, oddities: &mut Oddities) {
-        let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
-        let part = self.part(state);
-        let at = u32::try_from(number).unwrap_or(u32::MAX);
-        let (mut rest, mut before) = (line, None);
-        loop {
-            rest = rest.trim_ascii_start();
-            if rest.first().is_none_or(|&b| b == b'#') {
-                break;
-            }
-            let Some([position, ..]) = corner(&mut rest, counts) else {
-                return oddities.in_line(number, "a line cannot be read; what follows of it is left out");
-            };
-            if let Some(before) = before.replace(position) {
-                self.segments.push((part, [before, position], at));
-            }
-        }
-    }
-
-    /// The number of the part that new faces and lines belong to.
-    fn part(&mut self, state: &mut State) -> u32 {
-        if let Some(part) = state.part {
-            return part;
-        }
-        let name = match (state.object.as_str(), state.group.as_str()) {
-            (object, "") => object.to_owned(),
-            ("", group) => group.to_owned(),
-            (object, group) => format!("{object}/{group}"),
-        };
-        let parts = &mut self.parts;
-        let part = *state.part_of_name.entry(name).or_insert_with_key(|name| {
-            parts.push(name.clone());
-            (parts.len() - 1) as u32
-        });
-        state.part = Some(part);
-        part
-    }
-
-    fn begin_run(&mut self, state: &mut State) {
-        state.changed = false;
-        let part = self.part(state);
-        let material = state.material;
-        if self.runs.last().is_none_or(|run| run.part != part || run.material != material) {
-            self.runs.push(Run { first_face: self.faces.len() as u32, part, material });
-        }
-    }
-
-    fn other(&mut self, line: &[u8], number: u64, state: &mut State, oddities: &mut Oddities) {
-        let mut rest = line;
-        let Some(keyword) = text::word(&mut rest) else { return };
-        let rest = rest.trim_ascii();
-        let place = || format!("line {number}");
-        self.known_lines += 1;
-        match keyword {
-            b"o" => {
-                state.object = String::from_utf8_lossy(rest).into_owned();
-                state.group.clear();
-                (state.changed, state.part) = (true, None);
-            }
-            b"g" => {
-                // Several names on a line put a face into several groups; together they name one part.
-                state.group = String::from_utf8_lossy(rest).into_owned();
-                (state.changed, state.part) = (true, None);
-            }
-            b"usemtl" => {
-                let materials = &mut self.materials;
-                state.material = *state.material_of_name.entry(rest.to_owned()).or_insert_with_key(|name| {
-                    materials.push(name.clone());
-                    (materials.len() - 1) as u32
-                });
-                state.changed = true;
-            }
-            b"mtllib" => {
-                if state.known_libraries.insert(rest.to_owned()) {
-                    self.libraries.push(rest.to_owned());
-                }
-            }
-            // Smoothing groups: where a file has no normals, its faces are flat. The rest is rendering state.
-            b"s" | b"mg" | b"bevel" | b"c_interp" | b"d_interp" | b"lod" | b"usemap" | b"maplib"
-            | b"shadow_obj" | b"trace_obj" => {}
-            b"fo" => self.face(rest, number, state, oddities),
-            b"p" => oddities.in_line(number, "points are left out; only faces and lines are read"),
-            b"l" => self.line(rest, number, state, oddities),
-            b"call" | b"csh" => {
-                oddities
-                    .in_line(number, "other files are not called, nor commands run; the line is left out");
-            }
-            b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"curv" | b"curv2" | b"surf" | b"parm"
-            | b"trim" | b"hole" | b"scrv" | b"sp" | b"end" | b"con" | b"ctech" | b"stech" | b"bsp"
-            | b"bzp" | b"cdc" | b"cdp" | b"res" => oddities.note("curves", place, || {
-                "curves and curved surfaces are left out; only faces and lines are read".into()
-            }),
-            _ => {
-                self.known_lines -= 1;
-                oddities.note("unknown", place, || {
-                    format!("{} is not a word of the format; the line is left out", text::quoted(keyword))
-                });
-            }
-        }
-    }
-
     /// Takes off corners what does not exist: texture coordinates and normals that are not there.
     fn mend_corners(&mut self, oddities: &mut Oddities) {
         let (uvs, normals) = (&self.uvs, &self.normals);
@@ -335,6 +227,184 @@ impl Statements {
     }
 }
 
+impl Piece {
+    /// Reads a piece of a file. Texts are cut only where a statement ends.
+    fn read(bytes: &[u8]) -> Result<Piece, TooLarge> {
+        let mut piece = Piece {
+            statements: Statements::default(),
+            oddities: Oddities::default(),
+            parts: Vec::new(),
+            corners_back: Vec::new(),
+            lines_back: Vec::new(),
+            lines: 0,
+            names: Names::default(),
+            material: BEFORE,
+            changed: true,
+            part: None,
+            part_of_names: HashMap::new(),
+            material_of_name: HashMap::new(),
+        };
+        let mut lines = Lines::continued(bytes);
+        // `number()` borrows what the line borrows.
+        let mut number = 0;
+        while let Some(line) = lines.next() {
+            let line_number = number + 1;
+            let all = &mut piece.statements;
+            match line {
+                [] | [b'#', ..] => {}
+                [b'v', b, rest @ ..] if is_blank(*b) => {
+                    all.position(rest, line_number, &mut piece.oddities);
+                }
+                [b'f', b, rest @ ..] if is_blank(*b) => piece.face(rest, line_number),
+                [b'v', b'n', b, rest @ ..] if is_blank(*b) => all.normal(rest),
+                [b'v', b't', b, rest @ ..] if is_blank(*b) => all.uv(rest),
+                _ => piece.other(line, line_number),
+            }
+            number = lines.number();
+            piece.statements.check_counts()?;
+        }
+        piece.lines = number;
+        Ok(piece)
+    }
+
+    /// How many positions, texture coordinates and normals are known.
+    #[inline]
+    fn counts(&self) -> [usize; 3] {
+        [self.statements.positions.len(), self.statements.uvs.len(), self.statements.normals.len()]
+    }
+
+    fn face(&mut self, line: &[u8], number: u64) {
+        let counts = self.counts();
+        let corners = &mut self.statements.corners;
+        let (first, first_back) = (corners.len(), self.corners_back.len());
+        let mut rest = line;
+        loop {
+            while let [b, after @ ..] = rest
+                && is_blank(*b)
+            {
+                rest = after;
+            }
+            if rest.first().is_none_or(|&b| b == b'#') {
+                break;
+            }
+            let Some(corner) = corner(&mut rest, counts, corners.len(), &mut self.corners_back) else {
+                corners.truncate(first);
+                self.corners_back.truncate(first_back);
+                return self.oddities.in_line_with(number, "corner", || {
+                    format!("the face {} cannot be read and is left out", text::quoted(line))
+                });
+            };
+            corners.push(corner);
+        }
+        let end = corners.len();
+        if end < first + 3 {
+            corners.truncate(first);
+            self.corners_back.truncate(first_back);
+            return self.oddities.in_line(number, "a face has fewer than three corners and is left out");
+        }
+        if self.changed {
+            self.begin_run();
+        }
+        let line = u32::try_from(number).unwrap_or(u32::MAX);
+        self.statements.faces.push(Face { end: end as u32, line });
+    }
+
+    /// `l`: a line through corners; texture coordinates are of no use to it.
+    fn line(&mut self, line: &[u8], number: u64) {
+        let counts = self.counts();
+        let part = self.part();
+        let corners = &mut self.statements.line_corners;
+        let mut rest = line;
+        loop {
+            rest = rest.trim_ascii_start();
+            if rest.first().is_none_or(|&b| b == b'#') {
+                break;
+            }
+            let Some([position, ..]) = corner(&mut rest, counts, corners.len(), &mut self.lines_back) else {
+                self.lines_back.retain(|back| back.corner < corners.len());
+                self.oddities.in_line(number, "a line cannot be read; what follows of it is left out");
+                break;
+            };
+            corners.push(position);
+        }
+        let (end, line) = (corners.len() as u32, u32::try_from(number).unwrap_or(u32::MAX));
+        self.statements.polylines.push(Polyline { end, line, part });
+    }
+
+    /// The number of the part that new faces and lines belong to.
+    fn part(&mut self) -> u32 {
+        if let Some(part) = self.part {
+            return part;
+        }
+        let parts = &mut self.parts;
+        let part = *self.part_of_names.entry(self.names.clone()).or_insert_with_key(|names| {
+            parts.push(names.clone());
+            (parts.len() - 1) as u32
+        });
+        self.part = Some(part);
+        part
+    }
+
+    fn begin_run(&mut self) {
+        self.changed = false;
+        let (part, material) = (self.part(), self.material);
+        let all = &mut self.statements;
+        if all.runs.last().is_none_or(|run| run.part != part || run.material != material) {
+            all.runs.push(Run { first_face: all.faces.len() as u32, part, material });
+        }
+    }
+
+    fn other(&mut self, line: &[u8], number: u64) {
+        let mut rest = line;
+        let Some(keyword) = text::word(&mut rest) else { return };
+        let rest = rest.trim_ascii();
+        let all = &mut self.statements;
+        all.known_lines += 1;
+        match keyword {
+            b"o" => {
+                let object = Some(String::from_utf8_lossy(rest).into_owned());
+                self.names = Names { object, group: Some(String::new()) };
+                (self.changed, self.part) = (true, None);
+            }
+            b"g" => {
+                // Several names on a line put a face into several groups; together they name one part.
+                self.names.group = Some(String::from_utf8_lossy(rest).into_owned());
+                (self.changed, self.part) = (true, None);
+            }
+            b"usemtl" => {
+                let materials = &mut all.materials;
+                self.material = *self.material_of_name.entry(rest.to_owned()).or_insert_with_key(|name| {
+                    materials.push(name.clone());
+                    (materials.len() - 1) as u32
+                });
+                self.changed = true;
+            }
+            b"mtllib" => all.libraries.push(rest.to_owned()),
+            // Smoothing groups: where a file has no normals, its faces are flat. The rest is rendering state.
+            b"s" | b"mg" | b"bevel" | b"c_interp" | b"d_interp" | b"lod" | b"usemap" | b"maplib"
+            | b"shadow_obj" | b"trace_obj" => {}
+            b"fo" => self.face(rest, number),
+            b"p" => self.oddities.in_line(number, "points are left out; only faces and lines are read"),
+            b"l" => self.line(rest, number),
+            b"call" | b"csh" => {
+                self.oddities
+                    .in_line(number, "other files are not called, nor commands run; the line is left out");
+            }
+            b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"curv" | b"curv2" | b"surf" | b"parm"
+            | b"trim" | b"hole" | b"scrv" | b"sp" | b"end" | b"con" | b"ctech" | b"stech" | b"bsp"
+            | b"bzp" | b"cdc" | b"cdp" | b"res" => self.oddities.in_line_with(number, "curves", || {
+                "curves and curved surfaces are left out; only faces and lines are read".into()
+            }),
+            _ => {
+                all.known_lines -= 1;
+                self.oddities.in_line_with(number, "unknown", || {
+                    format!("{} is not a word of the format; the line is left out", text::quoted(keyword))
+                });
+            }
+        }
+    }
+}
+
 /// The first three numbers of a line; NaN for each that is missing.
 fn leading_numbers(mut line: &[u8]) -> [f32; 3] {
     let mut values = [f32::NAN; 3];
@@ -350,29 +420,53 @@ fn linear(encoded: f32) -> f32 {
     srgb::linear(f64::from(encoded.max(0.0))) as f32
 }
 
-/// Takes `v`, `v/vt`, `v//vn` or `v/vt/vn` from the front of `rest`.
+/// Takes `v`, `v/vt`, `v//vn` or `v/vt/vn` from the front of `rest`. Indices that count back are noted in `back`,
+/// as those of corner `number`.
 #[inline]
-fn corner(rest: &mut &[u8], [positions, uvs, normals]: [usize; 3]) -> Option<Corner> {
-    let position = index(rest, positions)?;
-    let (mut uv, mut normal) = (NONE, NONE);
+fn corner(
+    rest: &mut &[u8],
+    counts: [usize; 3],
+    number: usize,
+    back: &mut Vec<CountedBack>,
+) -> Option<Corner> {
+    let mut corner = [NONE; 3];
+    let mut take = |rest: &mut &[u8], which: usize| -> Option<()> {
+        corner[which] = match index(rest, counts[which])? {
+            Index::At(index) => index,
+            Index::Back(index) => {
+                back.push(CountedBack { corner: number, which, index });
+                NOWHERE
+            }
+        };
+        Some(())
+    };
+    take(rest, 0)?;
     if let [b'/', after @ ..] = *rest {
         *rest = after;
         if rest.first().is_some_and(|&b| b != b'/' && !is_blank(b)) {
-            uv = index(rest, uvs)?;
+            take(rest, 1)?;
         }
         if let [b'/', after @ ..] = *rest {
             *rest = after;
             if rest.first().is_some_and(|&b| !is_blank(b)) {
-                normal = index(rest, normals)?;
+                take(rest, 2)?;
             }
         }
     }
-    rest.first().is_none_or(|&b| is_blank(b) || b == b'#').then_some([position, uv, normal])
+    rest.first().is_none_or(|&b| is_blank(b) || b == b'#').then_some(corner)
+}
+
+/// What an index of a file says.
+enum Index {
+    /// The thing of this number in the whole file, or [`NOWHERE`].
+    At(u32),
+    /// The thing of this number in the piece; the negative ones are of the pieces before.
+    Back(i64),
 }
 
 /// Takes an index from the front of `rest`, from 1, or negative counting back from the last of `count`.
 #[inline]
-fn index(rest: &mut &[u8], count: usize) -> Option<u32> {
+fn index(rest: &mut &[u8], count: usize) -> Option<Index> {
     let (negative, mut digits) = match *rest {
         [b'-', after @ ..] => (true, after),
         _ => (false, *rest),
@@ -387,8 +481,12 @@ fn index(rest: &mut &[u8], count: usize) -> Option<u32> {
         return None;
     }
     *rest = digits;
-    let from_zero = if negative { (count as u64).checked_sub(value) } else { value.checked_sub(1) };
-    // 0 is no index; -0 is the one after the last, which is as wrong.
-    let found = from_zero.filter(|_| value != 0).unwrap_or(u64::from(NOWHERE));
-    Some(found.min(u64::from(NOWHERE)) as u32)
+    let nowhere = u64::from(NOWHERE);
+    Some(match value {
+        // 0 is no index; -0 is the one after the last, which is as wrong.
+        0 => Index::At(NOWHERE),
+        _ if negative && value <= nowhere => Index::Back(count as i64 - value as i64),
+        _ if negative => Index::At(NOWHERE),
+        _ => Index::At((value - 1).min(nowhere) as u32),
+    })
 }

@@ -1,6 +1,8 @@
 //! OBJ files made here, good and bad, and what becomes of them.
 
 use super::from_bytes;
+use super::parse::parse_in;
+use crate::oddities::Oddities;
 use crate::texture::tests::png_of;
 use crate::{Error, Loaded};
 use glam::{DVec2, Vec2, Vec3, Vec4};
@@ -261,7 +263,67 @@ fn what_is_not_obj_is_refused_and_what_is_empty_read() {
     }
 }
 
+/// What a file says, read in so many pieces, and what was odd about it.
+fn in_pieces(pieces: usize, text: &[u8]) -> (String, Vec<String>) {
+    let mut oddities = Oddities::default();
+    let statements = parse_in(pieces, text, &mut oddities).unwrap();
+    let told = oddities.into_diagnostics();
+    (format!("{statements:?}"), told.iter().map(ToString::to_string).collect())
+}
+
+/// Statements that mean what they mean by what stands before them.
+const LINES: [&str; 22] = [
+    "v 0 0 0",
+    "v 1 0 0",
+    "v 0 1 0 1 0.5 0",
+    "v 1",
+    "vt 0 1",
+    "vn 0 0 1",
+    "f 1 2 3",
+    "f -1 -2 -3",
+    "f -1/-1 -2/-1 -9/-1",
+    "f -3//-1 1//1 -1//-1",
+    "f 1 -2 x",
+    "l -1 -2 1",
+    "l 1 -1/-1 -x",
+    "o a",
+    "g b",
+    "g",
+    "o",
+    "usemtl m",
+    "usemtl n",
+    "mtllib a.mtl",
+    "nonsense \\",
+    "",
+];
+
 proptest! {
+    #[test]
+    fn pieces_of_a_file_say_what_the_whole_says(
+        lines in prop::collection::vec((prop::sample::select(&LINES[..]), 0u8..8), 0..60),
+        pieces in 2usize..9,
+    ) {
+        let mut text = String::new();
+        for (line, end) in lines {
+            text.push_str(line);
+            text.push_str(["\n", "\n", "\n", "\r\n", " \\\n", "\\\r\n", "\r", " # \\\n"][end as usize]);
+        }
+        prop_assert_eq!(in_pieces(1, text.as_bytes()), in_pieces(pieces, text.as_bytes()));
+    }
+
+    #[test]
+    fn pieces_of_a_damaged_file_say_what_the_whole_says(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6),
+        pieces in 2usize..40,
+    ) {
+        let mut bytes = ODD.as_bytes().to_vec();
+        for (at, byte) in edits {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        prop_assert_eq!(in_pieces(1, &bytes), in_pieces(pieces, &bytes));
+    }
+
     #[test]
     fn damaged_files_are_read_or_refused(
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0u8..4), 1..12),

@@ -10,7 +10,7 @@ use hither::scene::Scene;
 /// Appends a part for each solid; on failure a line that says why.
 pub(super) fn read(bytes: &[u8], scene: &mut Scene, oddities: &mut Oddities) -> Result<(), String> {
     let mut reader = Reader::default();
-    let mut lines = Lines::plain(bytes);
+    let mut lines = Lines::plain(text::without_mark(bytes));
     let mut number = 0;
     while let Some(line) = lines.next() {
         number += 1;
