@@ -77,5 +77,8 @@ fn faces_are_what_the_z_buffer_shows() {
         }
     }
     assert!(same > 200_000, "{same}");
-    assert!((near_outlines + ties) * 500 < same, "{near_outlines} near outlines, {ties} ties, {same} the same");
+    assert!(
+        (near_outlines + ties) * 500 < same,
+        "{near_outlines} near outlines, {ties} ties, {same} the same"
+    );
 }

@@ -63,7 +63,8 @@ impl Choice {
 
     /// How much the surface bends in the world.
     fn bend(&self, shown: &Shown, solid: &Solid, edge: &Edge, places: [u32; 2]) -> f32 {
-        if solid.keeps_angles || places.contains(&NONE) {
+        let is_known = solid.keeps_angles || edge.traits & trait_of::THIN != 0;
+        if is_known || places.contains(&NONE) {
             return edge.bend;
         }
         let normal = |t: u32| {

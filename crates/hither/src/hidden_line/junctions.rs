@@ -6,7 +6,7 @@
 //! a partner stay whole. A corner lies on an edge if it is no farther from it than rounding in `f32` puts it.
 
 use super::ROUNDING;
-use super::topology::{Edge, Mix, NONE, Topology, ordered, trait_of};
+use super::topology::{Edge, Mix, NONE, Topology, bend, ordered, trait_of};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 
@@ -132,8 +132,7 @@ fn joined(
         edge.traits |= trait_of::NON_MANIFOLD;
     } else if b != NONE {
         let flipped = halves[0].forward == halves[1].forward;
-        let sign = if flipped { -1.0 } else { 1.0 };
-        edge.bend = (normals[a as usize] - sign * normals[b as usize]).length_squared() * 0.5;
+        edge.bend = bend(normals[a as usize], normals[b as usize], flipped);
         edge.traits |= if flipped { trait_of::FLIPPED } else { 0 };
         if !materials.is_empty() && materials[a as usize] != materials[b as usize] {
             edge.traits |= trait_of::BORDER;

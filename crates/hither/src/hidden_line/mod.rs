@@ -47,6 +47,7 @@ mod occluders;
 mod predicates;
 mod seams;
 mod shown;
+mod slivers;
 mod strokes;
 mod topology;
 mod trace;

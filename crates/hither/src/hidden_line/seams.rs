@@ -4,7 +4,7 @@
 //! ones are edges.
 
 use super::grid::{Places, Sorted};
-use super::topology::{Edge, NONE, ordered, trait_of};
+use super::topology::{Edge, NONE, bend, ordered, trait_of};
 use glam::Vec3;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
@@ -81,10 +81,7 @@ impl<'a> Seams<'a> {
             let (ka, kb) = (sides[0].1 as usize % 3, sides[1].1 as usize % 3);
             let forward = |t: u32, k: usize| self.triangles[t as usize][k] == vertices[0];
             let flipped = forward(a, ka) == forward(b, kb);
-            let sign = if flipped { -1.0 } else { 1.0 };
-            // From the difference, not from the product: that would lose small angles.
-            let normal = |t: u32| self.normals[t as usize];
-            edge.bend = (normal(a) - sign * normal(b)).length_squared() * 0.5;
+            edge.bend = bend(self.normals[a as usize], self.normals[b as usize], flipped);
             if !self.materials.is_empty() && self.materials[a as usize] != self.materials[b as usize] {
                 edge.traits |= trait_of::BORDER;
             }

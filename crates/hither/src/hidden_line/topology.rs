@@ -9,6 +9,7 @@ use super::crew::Crew;
 use super::grid::{Places, Sorted};
 use super::junctions;
 use super::seams::{Seams, Sides};
+use super::slivers;
 use crate::scene::{AlphaMode, Mesh, Scene};
 use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
@@ -30,6 +31,8 @@ pub(super) mod trait_of {
     pub const MARKED: u8 = 8;
     /// No triangle has it as a whole edge: planes must cut it by itself.
     pub const LOOSE: u8 = 16;
+    /// One of the triangles is too thin to have a normal of its own; that of a neighbour counts.
+    pub const THIN: u8 = 32;
 }
 
 /// Two vertices and the triangles between them.
@@ -112,6 +115,7 @@ impl Topology {
         if topology.drop_twins() {
             topology.find_edges(crew, &normals, &materials);
         }
+        slivers::smooth(&mut topology, &mut normals);
         topology.bodies = Bodies::find(crew, &topology);
         junctions::mend(&mut topology, &normals, &materials);
         let marked: Vec<[u32; 2]> = marked.iter().map(|&[a, b]| [corner(a), corner(b)]).collect();
@@ -204,9 +208,17 @@ pub(super) fn ordered(a: u32, b: u32) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
+/// 1 − cos of the angle between two normals, one of them turned round if it is `flipped`.
+#[inline(always)]
+pub(super) fn bend(m: Vec3, n: Vec3, flipped: bool) -> f32 {
+    // From the difference, not from the product: that would lose small angles.
+    let difference = if flipped { m + n } else { m - n };
+    difference.length_squared() * 0.5
+}
+
 /// Twice the area of a triangle, along its normal.
 #[inline(always)]
-fn across(t: [u32; 3], positions: &[Vec3]) -> DVec3 {
+pub(super) fn across(t: [u32; 3], positions: &[Vec3]) -> DVec3 {
     let at = |v: u32| positions[v as usize].as_dvec3();
     let a = at(t[0]);
     (at(t[1]) - a).cross(at(t[2]) - a)
