@@ -12,6 +12,7 @@ mod error;
 mod exr;
 mod format;
 pub mod gltf;
+mod input;
 mod map;
 pub mod obj;
 mod oddities;

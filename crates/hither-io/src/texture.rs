@@ -1,6 +1,7 @@
 //! Images inside or beside a model, decoded to textures; a few bytes cannot ask for much memory.
 
 use crate::Error;
+use crate::input;
 use hither::scene::{LINEAR_FROM_SRGB, Texture};
 use image::{ImageReader, Limits};
 use std::io::Cursor;
@@ -82,11 +83,7 @@ pub(crate) fn decode(name: &str, bytes: &[u8]) -> Result<Texture, String> {
 
 /// Reads a PNG, JPEG or WebP picture: width, height, and linear premultiplied RGBA, row by row.
 pub fn read_picture(path: &Path) -> Result<(u32, u32, Vec<[f32; 4]>), Error> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Io {
-        path: path.to_owned(),
-        action: "cannot read",
-        source,
-    })?;
+    let bytes = input::read(path)?;
     let texture =
         decode("picture", &bytes).map_err(|message| Error::Malformed { path: path.to_owned(), message })?;
     let linear = |[r, g, b, a]: [u8; 4]| {

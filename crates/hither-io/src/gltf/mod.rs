@@ -25,6 +25,7 @@ mod write;
 
 pub use write::write_glb;
 
+use crate::input;
 use crate::{Companions, Error, Loaded, ModelFolder};
 use buffers::Buffers;
 use fault::{Fault, Oddities, malformed, quoted, unsupported};
@@ -32,7 +33,6 @@ use hither::scene::{Content, Scene};
 use json::Document;
 use material::Materials;
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::Path;
 use texture::Textures;
 
@@ -56,11 +56,7 @@ const DRACO: &str = "KHR_draco_mesh_compression";
 ///
 /// Errors: the file cannot be read, it breaks glTF's rules, or it needs what is not supported.
 pub fn read(path: &Path) -> Result<Loaded, Error> {
-    let bytes = fs::read(path).map_err(|source| Error::Io {
-        path: path.to_owned(),
-        action: "cannot read",
-        source,
-    })?;
+    let bytes = input::read(path)?;
     from_bytes(path, &bytes, &ModelFolder::of(path))
 }
 

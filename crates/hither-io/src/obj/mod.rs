@@ -22,17 +22,14 @@ mod parse;
 mod tests;
 
 use crate::companions::{Companions, ModelFolder};
+use crate::input;
 use crate::oddities::Oddities;
 use crate::{Error, Loaded};
 use std::path::Path;
 
 /// Reads the OBJ file at `path`, and the material libraries and textures that it names from its folder.
 pub fn read(path: &Path) -> Result<Loaded, Error> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Io {
-        path: path.to_owned(),
-        action: "cannot read",
-        source,
-    })?;
+    let bytes = input::read(path)?;
     from_bytes(path, &bytes, &ModelFolder::of(path))
 }
 

@@ -16,6 +16,7 @@ mod rows;
 #[cfg(test)]
 mod tests;
 
+use crate::input;
 use crate::oddities::Oddities;
 use crate::{Error, Loaded};
 use header::Encoding;
@@ -24,11 +25,7 @@ use std::path::Path;
 
 /// Reads the PLY file at `path`.
 pub fn read(path: &Path) -> Result<Loaded, Error> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Io {
-        path: path.to_owned(),
-        action: "cannot read",
-        source,
-    })?;
+    let bytes = input::read(path)?;
     from_bytes(path, &bytes)
 }
 

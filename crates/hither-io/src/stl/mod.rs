@@ -13,6 +13,7 @@
 
 mod text;
 
+use crate::input;
 use crate::oddities::Oddities;
 use crate::polygon::doubled_area;
 use crate::weld::Welder;
@@ -29,11 +30,7 @@ const RECORD: usize = 50;
 
 /// Reads the STL file at `path`.
 pub fn read(path: &Path) -> Result<Loaded, Error> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Io {
-        path: path.to_owned(),
-        action: "cannot read",
-        source,
-    })?;
+    let bytes = input::read(path)?;
     from_bytes(path, &bytes)
 }
 

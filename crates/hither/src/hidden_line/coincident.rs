@@ -35,7 +35,7 @@ pub(super) fn draw_once(crew: Crew, pieces: &mut Vec<Piece>) {
     }
     let mut lines = Vec::new();
     crew.extend(&mut lines, pieces.len(), |i| Line::of(&pieces[i]));
-    let shares = crew.shares(cells.len(), 4);
+    let shares = crew.shares(cells.len(), 16);
     let mut covered = crew.map(shares, |range| overlaps(&cells, range, pieces, &lines)).concat();
     if covered.is_empty() {
         return;
