@@ -3,6 +3,7 @@
 use crate::console;
 use crate::failure::Failure;
 use serde_json::Value;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// A picture format, by the extension of its file.
@@ -47,6 +48,25 @@ pub fn numbered(path: &Path, frame: u32) -> PathBuf {
         }
     };
     path.with_file_name(name)
+}
+
+/// Checks that the file `output`, or one for each of `frames`, can be written, and a report to `report`.
+pub fn check(
+    output: Option<&Path>,
+    frames: Option<&Range<u32>>,
+    report: Option<&Path>,
+) -> Result<(), Failure> {
+    match (output, frames) {
+        (None, _) => {}
+        (Some(output), None) => hither_io::check_writable(output)?,
+        (Some(output), Some(frames)) => {
+            // The folder is the same for all; a thousand names show most other obstacles.
+            for frame in frames.clone().take(1000) {
+                hither_io::check_writable(&numbered(output, frame))?;
+            }
+        }
+    }
+    check_report(report)
 }
 
 /// Checks that a report can be written to `to`, if one is asked for.

@@ -58,7 +58,7 @@ mod tests {
     fn any_number_of_threads_reads_the_same() {
         let path = std::env::temp_dir().join(format!("hither-input-{}", std::process::id()));
         for length in [0, 1, PART, 2 * PART, 5 * PART / 2 + 7] {
-            let content: Vec<u8> = (0..length).map(|i| (i * 31 >> 3) as u8).collect();
+            let content: Vec<u8> = (0..length).map(|i| ((i * 31) >> 3) as u8).collect();
             std::fs::write(&path, &content).unwrap();
             for threads in [1, 3] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

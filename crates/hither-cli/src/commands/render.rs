@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let verbosity = arguments.report.verbosity();
     let to = arguments.report.json.as_deref();
     let format = arguments.output.as_deref().map(PictureFormat::of).transpose()?;
-    check_outputs(arguments)?;
+    outputs::check(arguments.output.as_deref(), arguments.view.frames.as_ref(), to)?;
 
     let start = Instant::now();
     let mut scene = source::open(&arguments.scene, verbosity)?;
@@ -78,21 +78,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     json.insert("index_ms".into(), report::milliseconds(index_time));
     json.insert("frames".into(), frames.into());
     outputs::write_report(to, &json.into())
-}
-
-fn check_outputs(arguments: &Arguments) -> Result<(), Failure> {
-    if let Some(output) = &arguments.output {
-        match &arguments.view.frames {
-            None => hither_io::check_writable(output)?,
-            Some(frames) => {
-                // The folder is the same for all; a thousand names show most other obstacles.
-                for frame in frames.clone().take(1000) {
-                    hither_io::check_writable(&outputs::numbered(output, frame))?;
-                }
-            }
-        }
-    }
-    outputs::check_report(arguments.report.json.as_deref())
 }
 
 /// Everything that is settled before the first picture.

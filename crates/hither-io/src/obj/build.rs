@@ -6,6 +6,7 @@ use crate::oddities::Oddities;
 use crate::polygon::{self, Fit, Triangulator};
 use glam::{Vec2, Vec3, Vec4};
 use hither::scene::{Content, Material, Mesh, Node, Primitive, Scene};
+use std::ops::Range;
 
 /// Makes a mesh and a node of every part that has triangles or lines.
 pub(super) fn build(statements: Statements, materials: Materials, oddities: &mut Oddities) -> Scene {
@@ -87,13 +88,8 @@ impl Builder<'_> {
         let uvs = self.attribute(runs, |[_, uv, _]| uv);
         for &at in runs {
             let run = self.statements.runs[at];
-            let end = self
-                .statements
-                .runs
-                .get(at + 1)
-                .map_or(self.statements.faces.len(), |r| r.first_face as usize);
             let first_triangle = mesh.triangles.len() as u32;
-            for face in run.first_face as usize..end {
+            for face in self.faces_of(at) {
                 if normals == Presence::Mixed {
                     self.give_normal(face);
                 }
@@ -123,13 +119,8 @@ impl Builder<'_> {
     fn attribute(&self, runs: &[usize], of: impl Fn(&Corner) -> &u32) -> Presence {
         let (mut some, mut none) = (false, false);
         for &at in runs {
-            let run = self.statements.runs[at];
-            let end = self
-                .statements
-                .runs
-                .get(at + 1)
-                .map_or(self.statements.faces.len(), |r| r.first_face as usize);
-            let corners = self.corners(run.first_face as usize).start..self.corners(end - 1).end;
+            let faces = self.faces_of(at);
+            let corners = self.corners(faces.start).start..self.corners(faces.end - 1).end;
             for corner in &self.statements.corners[corners] {
                 if *of(corner) == NONE {
                     none = true;
@@ -145,7 +136,13 @@ impl Builder<'_> {
         }
     }
 
-    fn corners(&self, face: usize) -> std::ops::Range<usize> {
+    /// The faces of a run.
+    fn faces_of(&self, run: usize) -> Range<usize> {
+        let Statements { runs, faces, .. } = &self.statements;
+        runs[run].first_face as usize..runs.get(run + 1).map_or(faces.len(), |next| next.first_face as usize)
+    }
+
+    fn corners(&self, face: usize) -> Range<usize> {
         let faces = &self.statements.faces;
         let start = if face == 0 { 0 } else { faces[face - 1].end as usize };
         start..faces[face].end as usize

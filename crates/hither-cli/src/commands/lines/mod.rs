@@ -23,7 +23,8 @@ use std::time::{Duration, Instant};
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let verbosity = arguments.report.verbosity();
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
-    check_outputs(arguments)?;
+    let report = arguments.report.json.as_deref();
+    outputs::check(arguments.output.as_deref(), arguments.view.frames.as_ref(), report)?;
     // All that follows is done in this pool. Nothing before needs one, so that this cannot come too late.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.into()).build_global();
 
@@ -115,20 +116,6 @@ impl Format {
             },
         )
     }
-}
-
-fn check_outputs(arguments: &Arguments) -> Result<(), Failure> {
-    if let Some(output) = &arguments.output {
-        match &arguments.view.frames {
-            None => hither_io::check_writable(output)?,
-            Some(frames) => {
-                for frame in frames.clone().take(1000) {
-                    hither_io::check_writable(&outputs::numbered(output, frame))?;
-                }
-            }
-        }
-    }
-    outputs::check_report(arguments.report.json.as_deref())
 }
 
 /// What is settled before a drawing.
