@@ -40,6 +40,8 @@ pub(crate) struct BoxesOnScreen {
     pub bottom: [i32; 16],
     /// No point of the box has a larger depth; +∞ where it may reach the near plane.
     pub depth: [f32; 16],
+    /// No point of the box has a smaller depth; 0 where it may reach the near plane.
+    pub farthest: [f32; 16],
     /// Boxes that the image may show.
     pub inside: u16,
     /// Of these, boxes wholly beyond the near plane and within the guard band.
@@ -88,15 +90,17 @@ pub(crate) fn project<S: Simd>(
     let (x_error, y_error) = (error(&reach, &view.x), error(&reach, &view.y));
     let (x, y) = (corners(&view.x, &lo, &hi), corners(&view.y, &lo, &hi));
     let (mut low, mut high) = ([f32x16::splat(simd, 0.0); 2], [f32x16::splat(simd, 0.0); 2]);
-    let (least_w, w_error, depth, clear, mut inside);
+    let (least_w, w_error, depth, farthest, clear, mut inside);
     if view.perspective {
         let w = corners(&view.w, &lo, &hi);
         w_error = error(&reach, &view.w);
         least_w = smallest(&w) - w_error;
         let near = f32x16::splat(simd, view.d[3] * 1.000_001);
         clear = least_w.simd_gt(near) & least_w.simd_gt(w_error * 8.0);
-        inside = (largest(&w) + w_error).simd_ge(f32x16::splat(simd, view.d[3] * 0.999_999 - view.margin[0]));
+        let most_w = largest(&w) + w_error;
+        inside = most_w.simd_ge(f32x16::splat(simd, view.d[3] * 0.999_999 - view.margin[0]));
         depth = near / least_w * 1.000_001;
+        farthest = near / most_w * 0.999_997;
         for c in 0..8 {
             let reciprocal = f32x16::splat(simd, 1.0) / w[c];
             let (qx, qy) = (x[c] * reciprocal, y[c] * reciprocal);
@@ -113,8 +117,8 @@ pub(crate) fn project<S: Simd>(
         (least_w, w_error) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
         depth = largest(&d) + d_error;
         clear = depth.simd_le(f32x16::splat(simd, 1.0));
-        inside = (smallest(&d) - d_error).simd_le(f32x16::splat(simd, 1.0))
-            & depth.simd_gt(f32x16::splat(simd, 0.0));
+        farthest = smallest(&d) - d_error;
+        inside = farthest.simd_le(f32x16::splat(simd, 1.0)) & depth.simd_gt(f32x16::splat(simd, 0.0));
         low = [smallest(&x), smallest(&y)];
         high = [largest(&x), largest(&y)];
     }
@@ -151,12 +155,14 @@ pub(crate) fn project<S: Simd>(
     }
     let ordered = if view.in_range { ordered(&lo, &hi).to_bitmask() as u16 } else { 0 };
     let infinite = f32x16::splat(simd, f32::INFINITY);
+    let known = certain & mask32x16::from_bitmask(simd, u64::from(ordered));
     BoxesOnScreen {
         left: whole(rect[0]),
         top: whole(rect[1]),
         right: whole(rect[2]),
         bottom: whole(rect[3]),
-        depth: (certain & mask32x16::from_bitmask(simd, u64::from(ordered))).select(depth, infinite).into(),
+        depth: known.select(depth, infinite).into(),
+        farthest: known.select(farthest, f32x16::splat(simd, 0.0)).into(),
         // What is no box may be anywhere.
         inside: inside_bits | !ordered,
         clear: within.to_bitmask() as u16 & ordered,

@@ -141,6 +141,13 @@ impl Band {
         }
     }
 
+    /// Whether all that was drawn in the tiles of an image's rectangle (inclusive) is farther than `depth`, so that it
+    /// hides nothing there that is nowhere beyond.
+    #[inline(always)]
+    pub fn is_behind(&self, rect: [i32; 4], depth: f32) -> bool {
+        self.rows_of(rect).is_none_or(|rect| self.surface.is_behind(rect, depth))
+    }
+
     /// Draws the patches that may show, nearest first.
     #[inline(always)]
     pub fn draw<S: Simd>(&mut self, simd: S, standing: &Standing, drawn: &mut Drawn) {
@@ -302,7 +309,7 @@ impl Band {
     /// Fills the faces of a patch, whose turns are known and whose corners are placed or clipped.
     #[inline(always)]
     fn fill_faces<S: Simd>(&mut self, simd: S, faces: &[Face], slack: i32, jointly: bool) {
-        let (surface, joint) = (&mut self.surface, &mut self.joint);
+        let (surface, joint, nearest) = (&mut self.surface, &mut self.joint, self.placed.nearest);
         // Those that were clipped come in the order of the faces.
         let mut next = 0;
         for (f, face) in faces.iter().enumerate() {
@@ -314,7 +321,7 @@ impl Band {
             let corner = self.placed.corners(&face.corner);
             if self.clipped.get(next).is_none_or(|c| c.0 != f as u32) {
                 let outline = Outline { corner, corners: usize::from(face.corners), turn, ends };
-                fill(simd, surface, joint, &outline, slack, jointly);
+                fill(simd, surface, joint, &outline, slack, nearest, jointly);
                 continue;
             }
             let pieces = self.clipped[next].1;
@@ -325,7 +332,7 @@ impl Band {
                     if face.corners == 3 { ends } else { ends_of_half(ends, p, pieces[1 - p].is_none()) };
                 for i in 1..piece.len - 1 {
                     let outline = of_fan(piece, i, turn, ends);
-                    fill(simd, surface, joint, &outline, slack, jointly);
+                    fill(simd, surface, joint, &outline, slack, nearest, jointly);
                 }
             }
         }
@@ -427,13 +434,14 @@ impl Band {
     }
 }
 
-/// Whether faces are so small that each one's farthest corner is bound enough for its depth.
+/// Whether a patch that touches a rectangle is better drawn by its outline than face by face.
 fn is_fine([left, top, right, bottom]: [i32; 4], faces: u32) -> bool {
     (right - left + 1) * (bottom - top + 1) <= PX_A_FINE_FACE * faces as i32
 }
 
-/// Pixels in the rectangle around a patch for each of its faces.
-const PX_A_FINE_FACE: i32 = 16;
+/// Pixels in the rectangle around a patch for each of its faces up to which it is drawn by its outline. Beyond that,
+/// faces bound each other's depth too loosely, and large ones cost less tile by tile.
+const PX_A_FINE_FACE: i32 = 128;
 
 /// The turn of a face whose corners are placed, or 0 if it is not drawn.
 #[inline(always)]

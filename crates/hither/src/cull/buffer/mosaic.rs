@@ -1,13 +1,17 @@
-//! Patches of many small faces: coverage from the outline alone, depth from the faces' corners.
+//! Patches of many faces that are not large: coverage from the outline alone, depth from the rectangles around faces.
 //!
 //! ```text
 //! 1. which faces turn to the eye: sixteen planes at a time
-//! 2. depth: each face that is drawn lowers the pixels of the rectangle around it to its farthest corner
+//! 2. depth: each face that is drawn lowers the pixels of the rectangle around it to its plane, where that is nearer
+//!    than its farthest corner; to that corner if the face is but a few pixels large
 //! 3. the outline: edges between faces that are drawn and faces that are not, or that turn the other way
 //! 4. the count of each pixel: going down a column of pixel centres, the outline's edges that are crossed, each
 //!    +1 or −1; less one where an edge of the outline touches the pixel with its centre on the inner side
 //! 5. pixels whose count is at least one get their depth
 //! ```
+//!
+//! *Depth.* A face's plane, lowered as in [`fill`](super::fill), is nowhere above the face in a pixel that the face
+//! touches. In the other pixels of the rectangle it stands for nothing and can only lower what is there.
 //!
 //! *Count.* How many faces of a chain cover a point, each with the sign of its turn, is how often the chain's
 //! boundary winds around the point, and that is the sum of the boundary's crossings with a ray. So step 4
@@ -23,8 +27,9 @@
 //! quotient that is not whole is at least 2⁻²³ from a whole number, and near the patch, at most 2²⁰ in
 //! magnitude, the computed one is off by less than 2⁻³⁰: rounding it after moving it by 2⁻³⁰ is exact.
 
-use super::fill::{first_pixel, last_pixel};
-use super::fine::FinePatch;
+use super::fill::{Corner, first_pixel, last_pixel, plane_below};
+use super::fine::{FineFace, FinePatch};
+use super::loose::tile_plane;
 use super::place::{Placed, ROUND};
 use super::surface::Surface;
 use crate::raster::ScreenFromObject;
@@ -95,6 +100,19 @@ impl Area {
     fn stride(&self) -> usize {
         self.rows + 1
     }
+}
+
+/// A face that touches no more pixels each way has its farthest corner for a plane: it is as good a bound.
+const FEW_PX: i32 = 4;
+
+/// The plane below a face, given its corners as they are placed.
+#[inline(always)]
+fn plane_of<S: Simd>(corners: [i32x4<S>; 4], face: &FineFace, slack: i32) -> [f64; 3] {
+    let [a, b, c, d]: [[i32; 4]; 4] =
+        [corners[0].into(), corners[1].into(), corners[2].into(), corners[3].into()];
+    let corner = [Corner::of_bits(a), Corner::of_bits(b), Corner::of_bits(c), Corner::of_bits(d)];
+    let size = corner[0].depth.max(corner[1].depth).max(corner[2].depth.max(corner[3].depth));
+    plane_below(&corner, face.corner[3] != face.corner[0], slack, size)
 }
 
 /// A pixel that no face touches.
@@ -265,14 +283,31 @@ impl Mosaic {
             if x0 > x1 || y0 > y1 {
                 continue;
             }
-            let depth = i32x16::splat(simd, depth[2]);
+            let farthest = depth[2];
+            let small = x1 - x0 < FEW_PX && y1 - y0 < FEW_PX;
+            let plane = if small { [0.0; 3] } else { plane_of([a, b, c, d], face, slack) };
             for sixteen in x0 >> 4..=x1 >> 4 {
                 let x = sixteen * 16;
                 let columns = (0xFFFFu64 << (x0 - x).max(0)) & (0xFFFF >> (15 - (x1 - x).min(15)));
-                let lower = mask32x16::from_bitmask(simd, columns).select(depth, nothing);
-                let at = ((x - area.left) >> 4) as usize * stride + (y0 - area.band - top) as usize;
-                for row in &mut self.depth[at..=at + (y1 - y0) as usize] {
-                    i32x16::from_slice(simd, &row.0).min(lower).store_slice(&mut row.0);
+                let columns = mask32x16::from_bitmask(simd, columns);
+                let first = ((x - area.left) >> 4) as usize * stride;
+                let row_of = |y: i32| first + (y - area.band - top) as usize;
+                if small {
+                    let lower = columns.select(i32x16::splat(simd, farthest), nothing);
+                    for row in &mut self.depth[row_of(y0)..=row_of(y1)] {
+                        i32x16::from_slice(simd, &row.0).min(lower).store_slice(&mut row.0);
+                    }
+                    continue;
+                }
+                let farthest = f32x16::splat(simd, f32::from_bits(farthest.cast_unsigned()));
+                for tile in y0 >> 4..=y1 >> 4 {
+                    let over = tile_plane(plane, x, tile * 16);
+                    let (from, to) = (y0.max(tile * 16), y1.min(tile * 16 + 15));
+                    for (y, row) in (from..).zip(&mut self.depth[row_of(from)..=row_of(to)]) {
+                        let depth = over.row(simd, y & 15).max(farthest);
+                        let lower = columns.select(depth.bitcast(), nothing);
+                        i32x16::from_slice(simd, &row.0).min(lower).store_slice(&mut row.0);
+                    }
                 }
             }
         }
