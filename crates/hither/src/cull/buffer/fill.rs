@@ -53,6 +53,17 @@ pub(super) struct Outline {
     pub ends: u32,
 }
 
+impl Outline {
+    /// Whether it is a tile's size or more, both ways.
+    #[inline(always)]
+    pub fn is_large(&self) -> bool {
+        let ([a, b, c, d], tile) = (&self.corner, 16 * 256);
+        let (left, right) = (a.x.min(b.x).min(c.x.min(d.x)), a.x.max(b.x).max(c.x.max(d.x)));
+        let (top, bottom) = (a.y.min(b.y).min(c.y.min(d.y)), a.y.max(b.y).max(c.y.max(d.y)));
+        right - left >= tile && bottom - top >= tile
+    }
+}
+
 /// Sixteen counts: a cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
@@ -413,7 +424,8 @@ pub(super) fn fill<S: Simd>(
     if right < 0 || bottom < 0 || left >= surface.width || top >= surface.height {
         return;
     }
-    let all_end = !jointly && outline.ends == (1 << outline.corners) - 1;
+    let edges = (1 << outline.corners) - 1;
+    let all_end = !jointly && outline.ends & edges == edges;
     if all_end && (right - left < 2 || bottom - top < 2) {
         // It touches at most two columns or rows; one that covers a pixel touches its neighbours too.
         return;

@@ -212,6 +212,7 @@ impl Frame {
             boxes,
             sizes,
             margin: self.margin(),
+            size: [self.view.width as i32, self.view.height as i32],
             least_px,
             px_a_face: 0,
             plain: false,
