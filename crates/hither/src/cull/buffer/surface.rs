@@ -83,7 +83,7 @@ pub(super) const COLUMNS: [f32; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 1
 fn blocks_in([x0, y0, x1, y1]: [i32; 4]) -> u32 {
     let columns = (15u32 << x0) & (15 >> (3 - x1));
     let rows = (0xFFFFu32 << (y0 * 4)) & (0xFFFF >> ((3 - y1) * 4));
-    (columns & 15) * 0x1111 & rows
+    ((columns & 15) * 0x1111) & rows
 }
 
 /// One row of a tile: a cache line.
