@@ -15,10 +15,7 @@ pub(crate) fn axes<S: Simd>(simd: S, sides: &[[f32; 16]; 3]) -> [f32x16<S>; 3] {
 /// `row · corner` for the eight corners; bit 0 of the corner is x, bit 1 y, bit 2 z.
 #[inline(always)]
 pub(crate) fn corners<S: Simd>(row: &[f32; 4], lo: &[f32x16<S>; 3], hi: &[f32x16<S>; 3]) -> [f32x16<S>; 8] {
-    let x = [lo[0] * row[0] + row[3], hi[0] * row[0] + row[3]];
-    let y = [lo[1] * row[1], hi[1] * row[1]];
-    let z = [lo[2] * row[2], hi[2] * row[2]];
-    let xy = [x[0] + y[0], x[1] + y[0], x[0] + y[1], x[1] + y[1]];
+    let (xy, z) = corner_sums(row, lo, hi);
     [
         xy[0] + z[0],
         xy[1] + z[0],
@@ -29,6 +26,19 @@ pub(crate) fn corners<S: Simd>(row: &[f32; 4], lo: &[f32x16<S>; 3], hi: &[f32x16
         xy[2] + z[1],
         xy[3] + z[1],
     ]
+}
+
+/// What [`corners`] adds up: the part of x and y, by the corner's lower two bits, and that of z, by its highest. A loop
+/// over corners that adds them itself needs fewer registers.
+#[inline(always)]
+pub(crate) fn corner_sums<S: Simd>(
+    row: &[f32; 4],
+    lo: &[f32x16<S>; 3],
+    hi: &[f32x16<S>; 3],
+) -> ([f32x16<S>; 4], [f32x16<S>; 2]) {
+    let x = [lo[0] * row[0] + row[3], hi[0] * row[0] + row[3]];
+    let y = [lo[1] * row[1], hi[1] * row[1]];
+    ([x[0] + y[0], x[1] + y[0], x[0] + y[1], x[1] + y[1]], [lo[2] * row[2], hi[2] * row[2]])
 }
 
 #[inline(always)]

@@ -35,7 +35,7 @@ mod setup;
 mod small;
 mod transform;
 
-pub(crate) use box_corners::{axes, corners, largest, smallest};
+pub(crate) use box_corners::{axes, corner_sums, corners, largest, smallest};
 pub use boxes::{BoxSet, ProjectedBoxes, project_boxes};
 pub use fill::{Drawing, draw_block};
 pub(crate) use guard::{GUARD_MAX, GUARD_MIN, GuardedPolygon};

@@ -7,7 +7,7 @@
 //! `(eₓ + |q|·e_w) / (W − e_w)` plus four roundings of q. Each comparison of a number that is not one fails
 //! on the side of *visible*.
 
-use crate::raster::{ScreenFromObject, axes, corners, largest, smallest};
+use crate::raster::{ScreenFromObject, axes, corner_sums, corners, largest, smallest};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 
 /// A transform made ready for boxes of its space.
@@ -40,6 +40,8 @@ pub(crate) struct BoxesOnScreen {
     pub bottom: [i32; 16],
     /// No point of the box has a larger depth; +∞ where it may reach the near plane.
     pub depth: [f32; 16],
+    /// No point of the box has a smaller depth; 0 where it may reach the near plane.
+    pub farthest: [f32; 16],
     /// Boxes that the image may show.
     pub inside: u16,
     /// Of these, boxes wholly beyond the near plane and within the guard band.
@@ -86,35 +88,42 @@ pub(crate) fn project<S: Simd>(
     let (lo, hi) = (axes(simd, min), axes(simd, max));
     let reach = reach(&lo, &hi);
     let (x_error, y_error) = (error(&reach, &view.x), error(&reach, &view.y));
-    let (x, y) = (corners(&view.x, &lo, &hi), corners(&view.y, &lo, &hi));
     let (mut low, mut high) = ([f32x16::splat(simd, 0.0); 2], [f32x16::splat(simd, 0.0); 2]);
-    let (least_w, w_error, depth, clear, mut inside);
+    let (least_w, w_error, depth, farthest, clear, mut inside);
     if view.perspective {
-        let w = corners(&view.w, &lo, &hi);
-        w_error = error(&reach, &view.w);
-        least_w = smallest(&w) - w_error;
-        let near = f32x16::splat(simd, view.d[3] * 1.000_001);
-        clear = least_w.simd_gt(near) & least_w.simd_gt(w_error * 8.0);
-        inside = (largest(&w) + w_error).simd_ge(f32x16::splat(simd, view.d[3] * 0.999_999 - view.margin[0]));
-        depth = near / least_w * 1.000_001;
+        let (x, y) = (corner_sums(&view.x, &lo, &hi), corner_sums(&view.y, &lo, &hi));
+        let w = corner_sums(&view.w, &lo, &hi);
+        let (mut w_low, mut w_high) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0));
         for c in 0..8 {
-            let reciprocal = f32x16::splat(simd, 1.0) / w[c];
-            let (qx, qy) = (x[c] * reciprocal, y[c] * reciprocal);
+            let (xy, z) = (c & 3, c >> 2);
+            let w = w.0[xy] + w.1[z];
+            let reciprocal = f32x16::splat(simd, 1.0) / w;
+            let (qx, qy) = ((x.0[xy] + x.1[z]) * reciprocal, (y.0[xy] + y.1[z]) * reciprocal);
             if c == 0 {
-                (low, high) = ([qx, qy], [qx, qy]);
+                (low, high, w_low, w_high) = ([qx, qy], [qx, qy], w, w);
             } else {
                 low = [low[0].min(qx), low[1].min(qy)];
                 high = [high[0].max(qx), high[1].max(qy)];
+                (w_low, w_high) = (w_low.min(w), w_high.max(w));
             }
         }
+        w_error = error(&reach, &view.w);
+        least_w = w_low - w_error;
+        let near = f32x16::splat(simd, view.d[3] * 1.000_001);
+        clear = least_w.simd_gt(near) & least_w.simd_gt(w_error * 8.0);
+        let most_w = w_high + w_error;
+        inside = most_w.simd_ge(f32x16::splat(simd, view.d[3] * 0.999_999 - view.margin[0]));
+        depth = near / least_w * 1.000_001;
+        farthest = near / most_w * 0.999_997;
     } else {
         let d = corners(&view.d, &lo, &hi);
         let d_error = error(&reach, &view.d);
         (least_w, w_error) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
         depth = largest(&d) + d_error;
         clear = depth.simd_le(f32x16::splat(simd, 1.0));
-        inside = (smallest(&d) - d_error).simd_le(f32x16::splat(simd, 1.0))
-            & depth.simd_gt(f32x16::splat(simd, 0.0));
+        farthest = smallest(&d) - d_error;
+        inside = farthest.simd_le(f32x16::splat(simd, 1.0)) & depth.simd_gt(f32x16::splat(simd, 0.0));
+        let (x, y) = (corners(&view.x, &lo, &hi), corners(&view.y, &lo, &hi));
         low = [smallest(&x), smallest(&y)];
         high = [largest(&x), largest(&y)];
     }
@@ -147,16 +156,18 @@ pub(crate) fn project<S: Simd>(
     let clear_bits = clear.to_bitmask() as u16;
     let crossing = inside_bits & !clear_bits;
     if crossing != 0 {
-        inside_bits &= !(crossing & beyond_a_side(simd, view, &x, &y, &lo, &hi, [x_error, y_error]));
+        inside_bits &= !(crossing & beyond_a_side(simd, view, &lo, &hi, [x_error, y_error]));
     }
     let ordered = if view.in_range { ordered(&lo, &hi).to_bitmask() as u16 } else { 0 };
     let infinite = f32x16::splat(simd, f32::INFINITY);
+    let known = certain & mask32x16::from_bitmask(simd, u64::from(ordered));
     BoxesOnScreen {
         left: whole(rect[0]),
         top: whole(rect[1]),
         right: whole(rect[2]),
         bottom: whole(rect[3]),
-        depth: (certain & mask32x16::from_bitmask(simd, u64::from(ordered))).select(depth, infinite).into(),
+        depth: known.select(depth, infinite).into(),
+        farthest: known.select(farthest, f32x16::splat(simd, 0.0)).into(),
         // What is no box may be anywhere.
         inside: inside_bits | !ordered,
         clear: within.to_bitmask() as u16 & ordered,
@@ -195,8 +206,6 @@ fn ordered<S: Simd>(lo: &[f32x16<S>; 3], hi: &[f32x16<S>; 3]) -> mask32x16<S> {
 fn beyond_a_side<S: Simd>(
     simd: S,
     view: &BoxView,
-    x: &[f32x16<S>; 8],
-    y: &[f32x16<S>; 8],
     lo: &[f32x16<S>; 3],
     hi: &[f32x16<S>; 3],
     errors: [f32x16<S>; 2],
@@ -206,9 +215,10 @@ fn beyond_a_side<S: Simd>(
     }
     let one = f32x16::splat(simd, 1.0);
     let w = if view.perspective { corners(&view.w, lo, hi) } else { [one; 8] };
+    let (x, y) = (corners(&view.x, lo, hi), corners(&view.y, lo, hi));
     let w_error = error(&reach(lo, hi), &view.w);
     let mut beyond = 0u16;
-    for (p, own, size) in [(x, errors[0], view.width), (y, errors[1], view.height)] {
+    for (p, own, size) in [(&x, errors[0], view.width), (&y, errors[1], view.height)] {
         for (bound, sign) in [(-0.01f32, 1.0f32), (size + 0.01, -1.0)] {
             let slack = own + w_error * bound.abs();
             let mut most = f32x16::splat(simd, f32::NEG_INFINITY);

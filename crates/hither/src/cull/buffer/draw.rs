@@ -3,9 +3,9 @@
 use super::Drawn;
 use super::ask::{BoxView, project};
 use super::clip::{self, Clipped, EdgeOf, clip, doubled_area};
-use super::fill::{Joint, Outline, fill};
+use super::fill::{Corner, Joint, Outline, fill, first_pixel, last_pixel};
 use super::loose::{LooseFaces, Sixteen, fill_one, set_up};
-use super::mosaic::{Drawing, Mosaic};
+use super::mosaic::{Area, Drawing, Mosaic};
 use super::occluder::{ENDS, Face, Occluder, Patch};
 use super::place::{Placed, Placing, Sizes};
 use super::surface::Surface;
@@ -73,6 +73,8 @@ pub(in crate::cull) struct Standing<'a> {
     pub(super) sizes: Sizes,
     /// How far the eye may move relative to it, metres, and pixels a metre at distance 1 across the image.
     pub margin: Option<(f64, f64)>,
+    /// Columns and rows of the image.
+    pub size: [i32; 2],
     /// Patches that touch fewer pixels across or down than this are not worth drawing.
     pub least_px: i32,
     /// Patches whose boxes cover fewer pixels than this for each face are not worth drawing.
@@ -139,6 +141,13 @@ impl Band {
             Some(rect) => self.surface.all_nearer(simd, rect, depth),
             None => true,
         }
+    }
+
+    /// Whether all that was drawn in the tiles of an image's rectangle (inclusive) is farther than `depth`, so that it
+    /// hides nothing there that is nowhere beyond.
+    #[inline(always)]
+    pub fn is_behind(&self, rect: [i32; 4], depth: f32) -> bool {
+        self.rows_of(rect).is_none_or(|rect| self.surface.is_behind(rect, depth))
     }
 
     /// Draws the patches that may show, nearest first.
@@ -264,7 +273,7 @@ impl Band {
         let Some(placing) = Placing::new(&standing.at, &standing.sizes, least_w) else { return };
         let plain = standing.plain || standing.margin.is_some() || !clear;
         if let (false, Some(fine)) = (plain, &patch.fine)
-            && is_fine(rect, patch.faces)
+            && is_fine(rect, patch.faces as usize, PX_A_FINE_FACE)
             && let Some(rect) = self.rows_of(rect)
         {
             let fine = standing.occluder.fine.get(fine, patch.faces);
@@ -290,7 +299,17 @@ impl Band {
         }
         let Some(margin_px) = self.margin_px(standing) else { return };
         drawn.patches += 1;
-        drawn.faces += self.turns.iter().filter(|turn| **turn != 0).count() as u64;
+        let count = self.turns.iter().filter(|turn| **turn != 0).count();
+        drawn.faces += count as u64;
+        if !(clear || standing.plain || standing.margin.is_some()) {
+            let rect = self.around_clipped(faces, placing.slack, standing.size);
+            if is_fine(rect, count, PX_A_CLIPPED_FACE) {
+                if let Some(rect) = self.rows_of(rect) {
+                    self.clipped_mosaic(simd, faces, rect, placing.slack);
+                }
+                return;
+            }
+        }
         self.fill_faces(simd, faces, placing.slack, margin_px > 0);
         if margin_px > 0 {
             self.joint.finish_eroded(simd, &mut self.surface, self.placed.nearest, margin_px);
@@ -299,10 +318,98 @@ impl Band {
         }
     }
 
+    /// The pixels of an image that what is drawn of a patch may touch; the last before the first if there is none.
+    fn around_clipped(&self, faces: &[Face], slack: i32, [width, height]: [i32; 2]) -> [i32; 4] {
+        let [mut left, mut top, mut right, mut bottom] = [i32::MAX, i32::MAX, i32::MIN, i32::MIN];
+        let mut take = |c: &Corner| {
+            (left, top) = (left.min(c.x), top.min(c.y));
+            (right, bottom) = (right.max(c.x), bottom.max(c.y));
+        };
+        let mut next = 0;
+        for (f, face) in faces.iter().enumerate() {
+            if self.turns[f] == 0 {
+                continue;
+            }
+            match self.clipped.get(next) {
+                Some((number, pieces)) if *number == f as u32 => {
+                    next += 1;
+                    let corners = pieces.iter().flatten().flat_map(|piece| &piece.corner[..piece.len]);
+                    corners.for_each(|(corner, _)| take(corner));
+                }
+                _ => self.placed.corners(&face.corner).iter().for_each(&mut take),
+            }
+        }
+        if left > right {
+            return [0, 0, -1, -1];
+        }
+        [
+            first_pixel(left, slack).max(0),
+            first_pixel(top, slack).max(0),
+            last_pixel(right, slack).min(width - 1),
+            last_pixel(bottom, slack).min(height - 1),
+        ]
+    }
+
+    /// Draws a patch, whose turns are known and whose corners are placed or clipped, by its outline.
+    #[inline(always)]
+    fn clipped_mosaic<S: Simd>(&mut self, simd: S, faces: &[Face], rect: [i32; 4], slack: i32) {
+        if rect[0] > rect[2] {
+            return;
+        }
+        let area = self.mosaic.begin(&self.surface, rect, slack);
+        let mut next = 0;
+        for (f, face) in faces.iter().enumerate() {
+            let turn = i32::from(self.turns[f]);
+            if turn == 0 {
+                continue;
+            }
+            let (ends, count) = (ends_of(face, f, &self.turns), usize::from(face.corners));
+            if self.clipped.get(next).is_none_or(|c| c.0 != f as u32) {
+                let corner = self.placed.corners(&face.corner);
+                self.face_of_mosaic(simd, &area, Outline { corner, corners: count, turn, ends: ALL }, slack);
+                for k in (0..count).filter(|k| ends >> k & 1 == 1) {
+                    self.mosaic.edge(&corner[k], &corner[(k + 1) % count], turn);
+                }
+                continue;
+            }
+            let pieces = self.clipped[next].1;
+            next += 1;
+            for (p, piece) in pieces.iter().enumerate() {
+                let Some(piece) = piece else { continue };
+                let ends = if count == 3 { ends } else { ends_of_half(ends, p, pieces[1 - p].is_none()) };
+                for i in 1..piece.len - 1 {
+                    let outline = Outline { ends: ALL, ..of_fan(piece, i, turn, ends) };
+                    self.face_of_mosaic(simd, &area, outline, slack);
+                }
+                for i in (0..piece.len).filter(|&i| end_after(piece, i, ends) == 1) {
+                    self.mosaic.edge(&piece.corner[i].0, &piece.corner[(i + 1) % piece.len].0, turn);
+                }
+            }
+        }
+        self.mosaic.end(simd, &mut self.surface, &area, self.placed.nearest);
+    }
+
+    /// Takes a face for the mosaic. A large one is filled by itself, too: where it covers whole pixels, what is farther
+    /// of its patch does not count.
+    #[inline(never)]
+    fn face_of_mosaic<S: Simd>(&mut self, simd: S, area: &Area, outline: Outline, slack: i32) {
+        let nearest = self.placed.nearest;
+        let (surface, joint, mosaic) = (&mut self.surface, &mut self.joint, &mut self.mosaic);
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                mosaic.face(simd, area, &outline.corner, outline.corners == 4);
+                if outline.is_large() {
+                    fill(simd, surface, joint, &outline, slack, nearest, false);
+                }
+            },
+        );
+    }
+
     /// Fills the faces of a patch, whose turns are known and whose corners are placed or clipped.
     #[inline(always)]
     fn fill_faces<S: Simd>(&mut self, simd: S, faces: &[Face], slack: i32, jointly: bool) {
-        let (surface, joint) = (&mut self.surface, &mut self.joint);
+        let (surface, joint, nearest) = (&mut self.surface, &mut self.joint, self.placed.nearest);
         // Those that were clipped come in the order of the faces.
         let mut next = 0;
         for (f, face) in faces.iter().enumerate() {
@@ -314,7 +421,7 @@ impl Band {
             let corner = self.placed.corners(&face.corner);
             if self.clipped.get(next).is_none_or(|c| c.0 != f as u32) {
                 let outline = Outline { corner, corners: usize::from(face.corners), turn, ends };
-                fill(simd, surface, joint, &outline, slack, jointly);
+                fill(simd, surface, joint, &outline, slack, nearest, jointly);
                 continue;
             }
             let pieces = self.clipped[next].1;
@@ -325,7 +432,7 @@ impl Band {
                     if face.corners == 3 { ends } else { ends_of_half(ends, p, pieces[1 - p].is_none()) };
                 for i in 1..piece.len - 1 {
                     let outline = of_fan(piece, i, turn, ends);
-                    fill(simd, surface, joint, &outline, slack, jointly);
+                    fill(simd, surface, joint, &outline, slack, nearest, jointly);
                 }
             }
         }
@@ -427,13 +534,26 @@ impl Band {
     }
 }
 
-/// Whether faces are so small that each one's farthest corner is bound enough for its depth.
-fn is_fine([left, top, right, bottom]: [i32; 4], faces: u32) -> bool {
-    (right - left + 1) * (bottom - top + 1) <= PX_A_FINE_FACE * faces as i32
+/// The surface ends at every edge of a face, as far as the face knows.
+const ALL: u32 = 15;
+
+/// Pixels in a rectangle (inclusive).
+fn area_of([left, top, right, bottom]: [i32; 4]) -> i64 {
+    i64::from(right - left + 1) * i64::from(bottom - top + 1)
 }
 
-/// Pixels in the rectangle around a patch for each of its faces.
-const PX_A_FINE_FACE: i32 = 16;
+/// Whether a patch that touches `rect` is better drawn by its outline than face by face.
+fn is_fine(rect: [i32; 4], faces: usize, px_a_face: i64) -> bool {
+    area_of(rect) <= px_a_face * faces as i64
+}
+
+/// Pixels in the rectangle around a patch for each of its faces up to which it is drawn by its outline. Beyond that,
+/// faces bound each other's depth too loosely, and large ones cost less tile by tile.
+const PX_A_FINE_FACE: i64 = 128;
+
+/// The same, of what is left where the patch was clipped. It has a few faces near the eye that are larger by far than
+/// the rest; filling the rest tile by tile is what would cost.
+const PX_A_CLIPPED_FACE: i64 = 1024;
 
 /// The turn of a face whose corners are placed, or 0 if it is not drawn.
 #[inline(always)]

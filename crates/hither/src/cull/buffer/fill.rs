@@ -10,6 +10,9 @@
 //! patch    the joint: pixels whose count is at least one get the least depth of all faces that touch them
 //! ```
 //!
+//! Where all pixels that a face may touch in a tile hold more than the patch's nearest depth already, the face is left
+//! out there: whatever the joint comes to, it raises none of them.
+//!
 //! An edge is `E = A·(X − x) + B·(Y − y)`, positive inside, on snapped coordinates; at pixel centres
 //! `e = ⌊(E + bias) / 256⌋ = A·px + B·py + C` is a whole number with whole steps, and `e ≥ 0` is the fill
 //! rule exactly. A pixel's square, widened by the slack, reaches `h = (|A| + |B|)·(128 + slack)` from there.
@@ -31,6 +34,12 @@ impl Corner {
     pub fn bits(&self) -> [i32; 4] {
         [self.x, self.y, self.depth.to_bits().cast_signed(), 0]
     }
+
+    /// The reverse of [`Corner::bits`].
+    #[inline(always)]
+    pub fn of_bits([x, y, depth, _]: [i32; 4]) -> Corner {
+        Corner { x, y, depth: f32::from_bits(depth.cast_unsigned()) }
+    }
 }
 
 /// A convex polygon of three or four corners.
@@ -42,6 +51,17 @@ pub(super) struct Outline {
     pub turn: i32,
     /// Bit k: the surface ends at the edge from corner k to the next.
     pub ends: u32,
+}
+
+impl Outline {
+    /// Whether it is a tile's size or more, both ways.
+    #[inline(always)]
+    pub fn is_large(&self) -> bool {
+        let ([a, b, c, d], tile) = (&self.corner, 16 * 256);
+        let (left, right) = (a.x.min(b.x).min(c.x.min(d.x)), a.x.max(b.x).max(c.x.max(d.x)));
+        let (top, bottom) = (a.y.min(b.y).min(c.y.min(d.y)), a.y.max(b.y).max(c.y.max(d.y)));
+        right - left >= tile && bottom - top >= tile
+    }
 }
 
 /// Sixteen counts: a cache line.
@@ -231,11 +251,13 @@ struct Face<'a> {
     plane: [f64; 3],
     farthest: f32,
     nearest: f32,
+    /// No face of the patch is nearer.
+    patch_nearest: f32,
 }
 
 impl<'a> Face<'a> {
     #[inline(always)]
-    fn new(outline: &'a Outline, slack: i32, band: i32) -> Face<'a> {
+    fn new(outline: &'a Outline, slack: i32, band: i32, patch_nearest: f32) -> Face<'a> {
         let c = &outline.corner;
         let (mut left, mut top, mut right, mut bottom) = (c[0].x, c[0].y, c[0].x, c[0].y);
         let (mut farthest, mut nearest) = (c[0].depth, c[0].depth);
@@ -251,34 +273,13 @@ impl<'a> Face<'a> {
             last_pixel(right, slack),
             last_pixel(bottom, slack) - band,
         ];
-        Face { outline, slack, band, around, plane: [0.0; 3], farthest, nearest }
+        Face { outline, slack, band, around, plane: [0.0; 3], farthest, nearest, patch_nearest }
     }
 
-    /// A plane through three corners, lowered until no corner lies below it, then by what it falls within a
-    /// pixel: where the face is, any plane is at most the largest of its excesses at the corners too high.
     #[inline(always)]
     fn set_plane(&mut self) {
-        let c = &self.outline.corner;
-        let (r1, r2, r3) = (from_first(c, 1), from_first(c, 2), from_first(c, 3));
-        // The larger of the two triangles along the diagonal from corner 0.
-        let (area, other) = (r1.0 * r2.1 - r2.0 * r1.1, r2.0 * r3.1 - r3.0 * r2.1);
-        let ((x1, y1, d1), (x2, y2, d2), area) =
-            if other.abs() > area.abs() { (r2, r3, other) } else { (r1, r2, area) };
-        let per = 1.0 / area;
-        let (mut a, mut b) = ((d1 * y2 - d2 * y1) * per, (d2 * x1 - d1 * x2) * per);
-        if !(a.abs() < 1e6 && b.abs() < 1e6) {
-            (a, b) = (0.0, 0.0);
-        }
-        let mut excess = (a * r1.0 + b * r1.1 - r1.2).max(a * r2.0 + b * r2.1 - r2.2).max(0.0);
-        if self.outline.corners == 4 {
-            excess = excess.max(a * r3.0 + b * r3.1 - r3.2);
-        }
-        let sub = 1.0 / 256.0;
         let size = self.nearest.abs().max(self.farthest.abs());
-        let fall = (a.abs() + b.abs()) * (0.5 + f64::from(self.slack) * sub) + f64::from(size) * 1e-12;
-        // From corner 0 to the centre of pixel (0, 0).
-        let (x0, y0) = (f64::from(c[0].x) * sub - 0.5, f64::from(c[0].y) * sub - 0.5);
-        self.plane = [a, b, f64::from(c[0].depth) - a * x0 - b * y0 - excess - fall];
+        self.plane = plane_below(&self.outline.corner, self.outline.corners == 4, self.slack, size);
     }
 
     /// The plane over a tile, lowered by more than the roundings of its use.
@@ -300,6 +301,13 @@ impl<'a> Face<'a> {
         let h = (i64::from(a.abs()) + i64::from(b.abs())) * i64::from(128 + self.slack);
         let (inside, touch) = (((h + 255) >> 8) as i32, ((h + 256) >> 8) as i32);
         Edge { a, b, c: e >> 8, inside, touch, ends: self.outline.ends >> k & 1 == 1 }
+    }
+
+    /// Columns and rows of the tile at (x, y) that the face may touch; there are some.
+    #[inline(always)]
+    fn within(&self, x: i32, y: i32) -> [i32; 4] {
+        let [left, top, right, bottom] = self.around;
+        [(left - x).max(0), (top - y).max(0), (right - x).min(15), (bottom - y).min(15)]
     }
 
     /// Edge k of a face of at most sixteen pixels each way, and e at a pixel in or beside it: 32 bits hold all.
@@ -340,6 +348,32 @@ impl<'a> Face<'a> {
     }
 }
 
+/// A plane through three corners of a face of three or four, lowered until no corner lies below it, then by what it
+/// falls within a pixel: where the face is, any plane is at most the largest of its excesses at the corners too high.
+/// No depth is larger than `size`. Depth at pixel (x, y) of the image is `plane[0]·x + plane[1]·y + plane[2]`.
+#[inline(always)]
+pub(super) fn plane_below(c: &[Corner; 4], four: bool, slack: i32, size: f32) -> [f64; 3] {
+    let (r1, r2, r3) = (from_first(c, 1), from_first(c, 2), from_first(c, 3));
+    // The larger of the two triangles along the diagonal from corner 0.
+    let (area, other) = (r1.0 * r2.1 - r2.0 * r1.1, r2.0 * r3.1 - r3.0 * r2.1);
+    let ((x1, y1, d1), (x2, y2, d2), area) =
+        if other.abs() > area.abs() { (r2, r3, other) } else { (r1, r2, area) };
+    let per = 1.0 / area;
+    let (mut a, mut b) = ((d1 * y2 - d2 * y1) * per, (d2 * x1 - d1 * x2) * per);
+    if !(a.abs() < 1e6 && b.abs() < 1e6) {
+        (a, b) = (0.0, 0.0);
+    }
+    let mut excess = (a * r1.0 + b * r1.1 - r1.2).max(a * r2.0 + b * r2.1 - r2.2).max(0.0);
+    if four {
+        excess = excess.max(a * r3.0 + b * r3.1 - r3.2);
+    }
+    let sub = 1.0 / 256.0;
+    let fall = (a.abs() + b.abs()) * (0.5 + f64::from(slack) * sub) + f64::from(size) * 1e-12;
+    // From corner 0 to the centre of pixel (0, 0).
+    let (x0, y0) = (f64::from(c[0].x) * sub - 0.5, f64::from(c[0].y) * sub - 0.5);
+    [a, b, f64::from(c[0].depth) - a * x0 - b * y0 - excess - fall]
+}
+
 /// Pixels and depth from corner 0 to corner k.
 #[inline(always)]
 fn from_first(c: &[Corner; 4], k: usize) -> (f64, f64, f64) {
@@ -373,8 +407,8 @@ impl Edge {
     }
 }
 
-/// Fills one convex face. `slack` is how far a corner may be from its true place, 1/256 pixel. Where the
-/// patch is to be eroded, all of it goes `jointly`.
+/// Fills one convex face of a patch no point of which is nearer than `patch_nearest`. `slack` is how far a corner may
+/// be from its true place, 1/256 pixel. Where the patch is to be eroded, all of it goes `jointly`.
 #[inline(always)]
 pub(super) fn fill<S: Simd>(
     simd: S,
@@ -382,14 +416,16 @@ pub(super) fn fill<S: Simd>(
     joint: &mut Joint,
     outline: &Outline,
     slack: i32,
+    patch_nearest: f32,
     jointly: bool,
 ) {
-    let mut face = Face::new(outline, slack, surface.top);
+    let mut face = Face::new(outline, slack, surface.top, patch_nearest);
     let [left, top, right, bottom] = face.around;
     if right < 0 || bottom < 0 || left >= surface.width || top >= surface.height {
         return;
     }
-    let all_end = !jointly && outline.ends == (1 << outline.corners) - 1;
+    let edges = (1 << outline.corners) - 1;
+    let all_end = !jointly && outline.ends & edges == edges;
     if all_end && (right - left < 2 || bottom - top < 2) {
         // It touches at most two columns or rows; one that covers a pixel touches its neighbours too.
         return;
@@ -442,12 +478,15 @@ fn fill_small<S: Simd, const N: usize>(simd: S, surface: &Surface, joint: &mut J
         let x = tile_x * 16;
         let plane = face.tile_plane(x, top);
         for tile_y in y0 >> 4..=y1 >> 4 {
+            let tile = surface.tile(tile_x, tile_y);
+            if !surface.may_gain(simd, tile, face.within(x, tile_y * 16), face.patch_nearest) {
+                continue;
+            }
             let rows = [y0.max(tile_y * 16), y1.min(tile_y * 16 + 15)];
             let mut first = [0; N];
             for k in 0..N {
                 first[k] = at_first[k] + edges[k].a * (x - (x0 & !15)) + edges[k].b * (rows[0] - y0);
             }
-            let tile = surface.tile(tile_x, tile_y);
             let place = Place { tile, x, rows, columns: column_bits(x0 - x, x1 - x), plane_top: top };
             into_joint::<S, N>(simd, joint, face, &edges, first, numbers, place, plane);
         }
@@ -583,8 +622,8 @@ fn fill_tiles<S: Simd>(simd: S, surface: &mut Surface, joint: &mut Joint, face: 
                 continue;
             }
             was_inside = true;
-            let joins = jointly || (crossed.shared && crossed.count > 0);
-            if !joins && surface.tile_min(tile) >= face.nearest {
+            let most = if crossed.shared { face.patch_nearest } else { face.nearest };
+            if !jointly && !surface.may_gain(simd, tile, face.within(x, y), most) {
                 continue;
             }
             let plane = face.tile_plane(x, y);
@@ -631,7 +670,7 @@ fn fill_tile<S: Simd, const N: usize>(
         }
         into_joint::<S, N>(simd, joint, face, &edges, first, numbers, place, plane);
     }
-    if jointly || surface.tile_min(tile) >= face.nearest {
+    if jointly || !surface.may_gain(simd, tile, face.within(x, y), face.nearest) {
         return;
     }
     let zero = i32x16::splat(simd, 0);

@@ -408,13 +408,14 @@ pub(super) fn fill_one<S: Simd>(simd: S, surface: &mut Surface, faces: &Sixteen,
                 let inside = (0xFFFFu32 << (top - y).max(0)) & (0xFFFF >> (15 - (bottom - y).min(15)));
                 let spans = spans(simd, faces, lane, (y + surface.top) as f32, inside);
                 let place = [cell_x * 64, y];
-                fill_tiles(simd, surface, &spans, columns, place, plane, nearest);
+                fill_tiles(simd, surface, &spans, columns, place, [first, top, last, bottom], plane, nearest);
             }
         }
     }
 }
 
-/// Fills those of four tiles of a row, from `x` on, that `columns` names.
+/// Fills those of four tiles of a row, from `x` on, that `columns` names. The face lies in `rect`.
+#[expect(clippy::too_many_arguments, reason = "the inner step of one loop, split off")]
 #[inline(always)]
 fn fill_tiles<S: Simd>(
     simd: S,
@@ -422,6 +423,7 @@ fn fill_tiles<S: Simd>(
     (from, to): &(f32x16<S>, f32x16<S>),
     columns: u32,
     [x, y]: [i32; 2],
+    rect: [i32; 4],
     plane: [f64; 3],
     nearest: f32,
 ) {
@@ -437,7 +439,10 @@ fn fill_tiles<S: Simd>(
         let tile = surface.tile(x >> 4, y >> 4);
         let over = tile_plane(plane, x, y + surface.top);
         let highest = nearest.min(over.max());
-        if surface.tile_min_now(simd, tile) >= highest {
+        let [left, top, right, bottom] = rect;
+        let inner = [(left - x).max(0), (top - y).max(0), (right - x).min(15), (bottom - y).min(15)];
+        surface.refresh_tile(simd, tile);
+        if !surface.may_gain(simd, tile, inner, highest) {
             continue;
         }
         if meets == 0xFFFF && (from.simd_le(x_first) & to.simd_ge(x_last)).all_true() {

@@ -47,9 +47,10 @@
 //! # Three ways to draw a patch
 //!
 //! All rest on the same inequality; they differ in what they need not look at. A patch of one face ends at every
-//! edge, so a pixel is covered where it lies inside all of them ([`loose`]). In a patch of many small faces N(c) is
-//! counted from the outline alone, and each face bounds depth by its farthest corner ([`mosaic`]). Else each face
-//! is filled, and only pixels that shared edges cross are counted ([`fill`]).
+//! edge, so a pixel is covered where it lies inside all of them ([`loose`]). In a patch of faces that are not large
+//! N(c) is counted from the outline alone, and each face lowers depth in the whole rectangle around it, to its plane
+//! or to its farthest corner ([`mosaic`]). Else each face is filled, and only pixels that shared edges cross are
+//! counted ([`fill`]).
 //!
 //! # Sampled
 //!
@@ -84,7 +85,7 @@ mod surface;
 pub(super) use ask::{BoxView, project};
 pub(super) use draw::Band;
 pub use occluder::{Occluder, OccluderError, Sides};
-pub use queries::{Boxes, ScreenRect};
+pub use queries::{Ball, Boxes, PlacedMesh, ScreenRect};
 pub use sampled::SampledBuffer;
 pub use shared::SharedBuffer;
 
@@ -189,7 +190,7 @@ impl Frame {
         }
     }
 
-    fn margin(&self) -> Option<(f64, f64)> {
+    pub(super) fn margin(&self) -> Option<(f64, f64)> {
         let metres = self.options.eye_moves + self.options.objects_move;
         (metres > 0.0).then(|| (metres, self.pixels_a_metre()))
     }
@@ -211,6 +212,7 @@ impl Frame {
             boxes,
             sizes,
             margin: self.margin(),
+            size: [self.view.width as i32, self.view.height as i32],
             least_px,
             px_a_face: 0,
             plain: false,

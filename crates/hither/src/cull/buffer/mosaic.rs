@@ -1,13 +1,20 @@
-//! Patches of many small faces: coverage from the outline alone, depth from the faces' corners.
+//! Patches of many faces that are not large: coverage from the outline alone, depth from the rectangles around faces.
 //!
 //! ```text
 //! 1. which faces turn to the eye: sixteen planes at a time
-//! 2. depth: each face that is drawn lowers the pixels of the rectangle around it to its farthest corner
+//! 2. depth: each face that is drawn lowers the pixels of the rectangle around it to its plane, where that is nearer
+//!    than its farthest corner; to that corner if the face is but a few pixels large
 //! 3. the outline: edges between faces that are drawn and faces that are not, or that turn the other way
 //! 4. the count of each pixel: going down a column of pixel centres, the outline's edges that are crossed, each
 //!    +1 or −1; less one where an edge of the outline touches the pixel with its centre on the inner side
 //! 5. pixels whose count is at least one get their depth
 //! ```
+//!
+//! A patch that the near plane or the guard band cuts comes as what is left of its faces, with the edges at which it
+//! ends: the count needs to know no more.
+//!
+//! *Depth.* A face's plane, lowered as in [`fill`](super::fill), is nowhere above the face in a pixel that the face
+//! touches. In the other pixels of the rectangle it stands for nothing and can only lower what is there.
 //!
 //! *Count.* How many faces of a chain cover a point, each with the sign of its turn, is how often the chain's
 //! boundary winds around the point, and that is the sum of the boundary's crossings with a ray. So step 4
@@ -23,8 +30,9 @@
 //! quotient that is not whole is at least 2⁻²³ from a whole number, and near the patch, at most 2²⁰ in
 //! magnitude, the computed one is off by less than 2⁻³⁰: rounding it after moving it by 2⁻³⁰ is exact.
 
-use super::fill::{first_pixel, last_pixel};
+use super::fill::{Corner, first_pixel, last_pixel, plane_below};
 use super::fine::FinePatch;
+use super::loose::tile_plane;
 use super::place::{Placed, ROUND};
 use super::surface::Surface;
 use crate::raster::ScreenFromObject;
@@ -73,13 +81,13 @@ pub(super) struct Mosaic {
     step: Vec<Sixteen>,
     /// Turn of each face: 1 front, −1 back, 0 not drawn; and one more 0, for where the surface ends.
     turn: Vec<i8>,
-    /// Edges at which what is drawn ends: the vertices, in the order of the face, and its turn.
-    outline: Vec<(u16, u16, i8)>,
+    /// Edges at which what is drawn ends: the corners, in the order of the face, and its turn on the screen.
+    outline: Vec<([i32; 4], [i32; 4], i32)>,
 }
 
 /// What part of the surface a patch is drawn in.
 #[derive(Clone, Copy)]
-struct Area {
+pub(super) struct Area {
     /// Columns and rows (inclusive) of the surface.
     rect: [i32; 4],
     /// Image row of the surface's first.
@@ -88,6 +96,8 @@ struct Area {
     left: i32,
     /// Rows of the rectangle.
     rows: usize,
+    /// How far a corner may be from its true place, 1/256 pixel.
+    slack: i32,
 }
 
 impl Area {
@@ -95,6 +105,19 @@ impl Area {
     fn stride(&self) -> usize {
         self.rows + 1
     }
+}
+
+/// A face that touches no more pixels each way has its farthest corner for a plane: it is as good a bound.
+const FEW_PX: i32 = 4;
+
+/// The plane below a face, given its corners as they are placed.
+#[inline(always)]
+fn plane_of<S: Simd>(corners: [i32x4<S>; 4], four: bool, slack: i32) -> [f64; 3] {
+    let [a, b, c, d]: [[i32; 4]; 4] =
+        [corners[0].into(), corners[1].into(), corners[2].into(), corners[3].into()];
+    let corner = [Corner::of_bits(a), Corner::of_bits(b), Corner::of_bits(c), Corner::of_bits(d)];
+    let size = corner[0].depth.max(corner[1].depth).max(corner[2].depth.max(corner[3].depth));
+    plane_below(&corner, four, slack, size)
 }
 
 /// A pixel that no face touches.
@@ -105,22 +128,47 @@ impl Mosaic {
     #[inline(always)]
     pub fn draw<S: Simd>(&mut self, simd: S, surface: &mut Surface, drawing: &Drawing) -> u64 {
         let &Drawing { patch, placed, eye, front_sign, slack, rect } = drawing;
+        let area = self.begin(surface, rect, slack);
+        self.take_turns(simd, &patch, eye);
+        let drawn = self.lower_depths(simd, &area, &patch, placed, front_sign);
+        self.end(simd, surface, &area, placed.nearest);
+        drawn
+    }
+
+    /// Makes room for a patch that touches no pixels but those of a rectangle of the surface.
+    pub fn begin(&mut self, surface: &Surface, rect: [i32; 4], slack: i32) -> Area {
         let left = rect[0] & !15;
-        let area = Area { rect, band: surface.top, left, rows: (rect[3] - rect[1] + 1) as usize };
+        let area = Area { rect, band: surface.top, left, rows: (rect[3] - rect[1] + 1) as usize, slack };
         let size = area.stride() * (((rect[2] - left) >> 4) + 1) as usize;
         if self.depth.len() < size {
             self.depth.resize(size, Sixteen([NO_DEPTH; 16]));
             self.step.resize(size, Sixteen([0; 16]));
         }
-        self.take_turns(simd, &patch, eye);
-        let drawn = self.lower_depths(simd, &area, &patch, placed, slack);
+        self.outline.clear();
+        area
+    }
+
+    /// Takes a face, of four corners or of three.
+    #[inline(always)]
+    pub fn face<S: Simd>(&mut self, simd: S, area: &Area, corner: &[Corner; 4], four: bool) {
+        let load = |k: usize| i32x4::from_slice(simd, &corner[k].bits());
+        self.lower(simd, area, [load(0), load(1), load(2), load(3)], four);
+    }
+
+    /// Takes an edge at which the patch ends, as it runs around a face that turns so.
+    #[inline(always)]
+    pub fn edge(&mut self, from: &Corner, to: &Corner, turn: i32) {
+        self.outline.push((from.bits(), to.bits(), turn));
+    }
+
+    /// Draws the patch whose faces and edges were taken.
+    #[inline(always)]
+    pub fn end<S: Simd>(&mut self, simd: S, surface: &mut Surface, area: &Area, nearest: f32) {
         for at in 0..self.outline.len() {
-            let (from, to, turn) = self.outline[at];
-            let (p, q) = (placed.corner[usize::from(from)], placed.corner[usize::from(to)]);
-            self.count_edge(simd, &area, p, q, front_sign * i32::from(turn), slack);
+            let (p, q, turn) = self.outline[at];
+            self.count_edge(simd, area, p, q, turn);
         }
-        self.finish(simd, surface, &area, placed.nearest);
-        drawn
+        self.finish(simd, surface, area, nearest);
     }
 
     #[inline(always)]
@@ -147,7 +195,8 @@ impl Mosaic {
     // long because its steps share the registers of eight columns
     /// Counts an edge of the outline, that runs around a face of `turn`, in the columns that it touches.
     #[inline(always)]
-    fn count_edge<S: Simd>(&mut self, simd: S, area: &Area, p: [i32; 4], q: [i32; 4], turn: i32, slack: i32) {
+    fn count_edge<S: Simd>(&mut self, simd: S, area: &Area, p: [i32; 4], q: [i32; 4], turn: i32) {
+        let slack = area.slack;
         let (dx, dy) = ((q[0] - p[0]) * turn, (q[1] - p[1]) * turn);
         let (low, high) = (p[0].min(q[0]), p[0].max(q[0]));
         // Columns whose centres the edge passes over, and those that it touches.
@@ -228,55 +277,77 @@ impl Mosaic {
         area: &Area,
         patch: &FinePatch,
         placed: &Placed,
-        slack: i32,
+        front_sign: i32,
     ) -> u64 {
-        let stride = area.stride();
-        let [left, top, right, bottom] = area.rect;
-        let first = i32x4::from_slice(simd, &[left, top + area.band, 0, 0]);
-        let last = i32x4::from_slice(simd, &[right, bottom + area.band, 0, 0]);
-        let nothing = i32x16::splat(simd, NO_DEPTH);
-        let (turns, corner) = (self.turn.as_slice(), placed.corner.as_slice());
-        self.outline.clear();
+        let corner = placed.corner.as_slice();
         let mut drawn = 0;
-        for (face, &turn) in patch.face.iter().zip(turns) {
+        for (f, face) in patch.face.iter().enumerate() {
+            let turn = self.turn[f];
             if turn == 0 {
                 continue;
             }
             drawn += 1;
-            let a = i32x4::from_slice(simd, &corner[usize::from(face.corner[0])]);
-            let b = i32x4::from_slice(simd, &corner[usize::from(face.corner[1])]);
-            let c = i32x4::from_slice(simd, &corner[usize::from(face.corner[2])]);
-            let d = i32x4::from_slice(simd, &corner[usize::from(face.corner[3])]);
-            let (least, most) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
-            let depth: [i32; 4] = least.into();
-            let from: [i32; 4] = ((least - (slack + 1)) >> 8).max(first).into();
-            let to: [i32; 4] = ((most + slack) >> 8).min(last).into();
             let mut ends = 0u32;
             for k in 0..4 {
-                ends |= u32::from(turns[usize::from(face.across[k])] != turn) << k;
+                ends |= u32::from(self.turn[usize::from(face.across[k])] != turn) << k;
             }
             while ends != 0 {
                 let k = ends.trailing_zeros() as usize & 3;
                 ends &= ends - 1;
                 // Of a triangle the edge from corner 2 leads to corner 3, which is corner 0.
-                self.outline.push((face.corner[k], face.corner[(k + 1) & 3], turn));
+                let [p, q] = [k, (k + 1) & 3].map(|k| corner[usize::from(face.corner[k])]);
+                self.outline.push((p, q, front_sign * i32::from(turn)));
             }
-            let ([x0, y0, ..], [x1, y1, ..]) = (from, to);
-            if x0 > x1 || y0 > y1 {
+            let a = i32x4::from_slice(simd, &corner[usize::from(face.corner[0])]);
+            let b = i32x4::from_slice(simd, &corner[usize::from(face.corner[1])]);
+            let c = i32x4::from_slice(simd, &corner[usize::from(face.corner[2])]);
+            let d = i32x4::from_slice(simd, &corner[usize::from(face.corner[3])]);
+            self.lower(simd, area, [a, b, c, d], face.corner[3] != face.corner[0]);
+        }
+        drawn
+    }
+
+    /// Lowers the pixels around a face to its plane, but not below its farthest corner.
+    #[inline(always)]
+    fn lower<S: Simd>(&mut self, simd: S, area: &Area, [a, b, c, d]: [i32x4<S>; 4], four: bool) {
+        let [left, top, right, bottom] = area.rect;
+        let first = i32x4::from_slice(simd, &[left, top + area.band, 0, 0]);
+        let last = i32x4::from_slice(simd, &[right, bottom + area.band, 0, 0]);
+        let (least, most) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+        let farthest: [i32; 4] = least.into();
+        let [x0, y0, ..]: [i32; 4] = ((least - (area.slack + 1)) >> 8).max(first).into();
+        let [x1, y1, ..]: [i32; 4] = ((most + area.slack) >> 8).min(last).into();
+        if x0 > x1 || y0 > y1 {
+            return;
+        }
+        let (stride, nothing) = (area.stride(), i32x16::splat(simd, NO_DEPTH));
+        let small = x1 - x0 < FEW_PX && y1 - y0 < FEW_PX;
+        let plane = if small { [0.0; 3] } else { plane_of([a, b, c, d], four, area.slack) };
+        let farthest = i32x16::splat(simd, farthest[2]);
+        for sixteen in x0 >> 4..=x1 >> 4 {
+            let x = sixteen * 16;
+            let columns = (0xFFFFu64 << (x0 - x).max(0)) & (0xFFFF >> (15 - (x1 - x).min(15)));
+            let columns = mask32x16::from_bitmask(simd, columns);
+            let above = ((x - area.left) >> 4) as usize * stride;
+            let row_of = |y: i32| above + (y - area.band - top) as usize;
+            if small {
+                let lower = columns.select(farthest, nothing);
+                for row in &mut self.depth[row_of(y0)..=row_of(y1)] {
+                    i32x16::from_slice(simd, &row.0).min(lower).store_slice(&mut row.0);
+                }
                 continue;
             }
-            let depth = i32x16::splat(simd, depth[2]);
-            for sixteen in x0 >> 4..=x1 >> 4 {
-                let x = sixteen * 16;
-                let columns = (0xFFFFu64 << (x0 - x).max(0)) & (0xFFFF >> (15 - (x1 - x).min(15)));
-                let lower = mask32x16::from_bitmask(simd, columns).select(depth, nothing);
-                let at = ((x - area.left) >> 4) as usize * stride + (y0 - area.band - top) as usize;
-                for row in &mut self.depth[at..=at + (y1 - y0) as usize] {
+            for tile in y0 >> 4..=y1 >> 4 {
+                let over = tile_plane(plane, x, tile * 16);
+                let (from, to) = (y0.max(tile * 16), y1.min(tile * 16 + 15));
+                for (y, row) in (from..).zip(&mut self.depth[row_of(from)..=row_of(to)]) {
+                    // Depths of 0 and more are ordered as their bits are, and what is below 0 comes before them.
+                    let depth = over.row(simd, y & 15).bitcast::<i32x16<S>>().max(farthest);
+                    let lower = columns.select(depth, nothing);
                     i32x16::from_slice(simd, &row.0).min(lower).store_slice(&mut row.0);
                 }
             }
         }
-        drawn
     }
 
     /// Adds up the counts, raises the pixels of the surface that are covered, and leaves all empty.

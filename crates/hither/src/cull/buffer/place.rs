@@ -18,8 +18,7 @@ pub(super) struct Placed {
 impl Placed {
     #[inline(always)]
     fn corner(&self, vertex: u32) -> Corner {
-        let [x, y, depth, _] = self.corner[vertex as usize];
-        Corner { x, y, depth: f32::from_bits(depth.cast_unsigned()) }
+        Corner::of_bits(self.corner[vertex as usize])
     }
 
     #[inline(always)]

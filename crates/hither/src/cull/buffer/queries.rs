@@ -99,6 +99,24 @@ pub struct ScreenRect {
     pub depth: f32,
 }
 
+/// A ball of world space to ask about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Its centre.
+    pub center: DVec3,
+    /// Its radius, metres.
+    pub radius: f64,
+}
+
+/// A mesh in its place to ask about.
+#[derive(Clone, Copy, Debug)]
+pub struct PlacedMesh<'a> {
+    /// Its surface.
+    pub mesh: &'a Occluder,
+    /// Where it is.
+    pub world_from_object: DAffine3,
+}
+
 impl OcclusionBuffer {
     /// Asks about many boxes of world space: one verdict each, in their order, into `verdicts`.
     pub fn ask(&self, boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
@@ -116,15 +134,30 @@ impl OcclusionBuffer {
         self.frame.ask_sphere(&[&self.band], center, radius)
     }
 
+    /// Asks about many balls: one verdict each, in their order, into `verdicts`.
+    pub fn ask_balls(&self, balls: &[Ball], verdicts: &mut Vec<Verdict>) {
+        self.frame.ask_balls(&[&self.band], balls, verdicts);
+    }
+
     /// Asks about a rectangle of the screen.
     pub fn ask_rect(&self, rect: &ScreenRect) -> Verdict {
         self.frame.ask_rect(&[&self.band], rect)
+    }
+
+    /// Asks about many rectangles of the screen: one verdict each, in their order, into `verdicts`.
+    pub fn ask_rects(&self, rects: &[ScreenRect], verdicts: &mut Vec<Verdict>) {
+        self.frame.ask_rects(&[&self.band], rects, verdicts);
     }
 
     /// Asks about another mesh, at the cost of drawing its boxes: hidden if each of its faces is. Finer than a
     /// box around it.
     pub fn ask_mesh(&self, mesh: &Occluder, world_from_object: &DAffine3) -> Verdict {
         self.frame.ask_mesh(&[&self.band], mesh, world_from_object)
+    }
+
+    /// Asks about many meshes: one verdict each, in their order, into `verdicts`.
+    pub fn ask_meshes(&self, meshes: &[PlacedMesh], verdicts: &mut Vec<Verdict>) {
+        self.frame.ask_meshes(&[&self.band], meshes, verdicts);
     }
 }
 
@@ -221,6 +254,21 @@ impl Frame {
         let mut verdicts = Vec::with_capacity(16);
         self.ask(bands, &boxes, &mut verdicts);
         verdicts[0]
+    }
+
+    pub(super) fn ask_balls(&self, bands: &[&Band], balls: &[Ball], verdicts: &mut Vec<Verdict>) {
+        verdicts.clear();
+        verdicts.extend(balls.iter().map(|ball| self.ask_sphere(bands, ball.center, ball.radius)));
+    }
+
+    pub(super) fn ask_rects(&self, bands: &[&Band], rects: &[ScreenRect], verdicts: &mut Vec<Verdict>) {
+        verdicts.clear();
+        verdicts.extend(rects.iter().map(|rect| self.ask_rect(bands, rect)));
+    }
+
+    pub(super) fn ask_meshes(&self, bands: &[&Band], meshes: &[PlacedMesh], verdicts: &mut Vec<Verdict>) {
+        verdicts.clear();
+        verdicts.extend(meshes.iter().map(|one| self.ask_mesh(bands, one.mesh, &one.world_from_object)));
     }
 
     pub(super) fn ask_sphere(&self, bands: &[&Band], center: DVec3, radius: f64) -> Verdict {

@@ -1,7 +1,7 @@
 //! An occlusion buffer that several threads draw into and ask at once.
 
 use super::draw::Band;
-use super::{Boxes, Drawn, Frame, Occluder, OcclusionOptions, ScreenRect, Verdict};
+use super::{Ball, Boxes, Drawn, Frame, Occluder, OcclusionOptions, PlacedMesh, ScreenRect, Verdict};
 use crate::conventions::{View, ViewError};
 use crate::geometry::Aabb;
 use fearless_simd::dispatch;
@@ -47,9 +47,7 @@ impl SharedBuffer {
 
     /// Asks about many boxes; see [`OcclusionBuffer::ask`](super::OcclusionBuffer::ask).
     pub fn ask(&self, boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
-        let bands = self.read();
-        let bands: Vec<&Band> = bands.iter().map(|b| &**b).collect();
-        self.frame.ask(&bands, boxes, verdicts);
+        self.asked(|bands| self.frame.ask(bands, boxes, verdicts));
     }
 
     /// Asks about one box of world space.
@@ -62,14 +60,29 @@ impl SharedBuffer {
         self.asked(|bands| self.frame.ask_sphere(bands, center, radius))
     }
 
+    /// Asks about many balls.
+    pub fn ask_balls(&self, balls: &[Ball], verdicts: &mut Vec<Verdict>) {
+        self.asked(|bands| self.frame.ask_balls(bands, balls, verdicts));
+    }
+
     /// Asks about a rectangle of the screen.
     pub fn ask_rect(&self, rect: &ScreenRect) -> Verdict {
         self.asked(|bands| self.frame.ask_rect(bands, rect))
     }
 
+    /// Asks about many rectangles of the screen.
+    pub fn ask_rects(&self, rects: &[ScreenRect], verdicts: &mut Vec<Verdict>) {
+        self.asked(|bands| self.frame.ask_rects(bands, rects, verdicts));
+    }
+
     /// Asks about another mesh.
     pub fn ask_mesh(&self, mesh: &Occluder, world_from_object: &DAffine3) -> Verdict {
         self.asked(|bands| self.frame.ask_mesh(bands, mesh, world_from_object))
+    }
+
+    /// Asks about many meshes.
+    pub fn ask_meshes(&self, meshes: &[PlacedMesh], verdicts: &mut Vec<Verdict>) {
+        self.asked(|bands| self.frame.ask_meshes(bands, meshes, verdicts));
     }
 
     /// What pixel (x, y) holds.
@@ -82,7 +95,7 @@ impl SharedBuffer {
         self.bands.iter().map(|b| b.read().unwrap_or_else(|broken| broken.into_inner())).collect()
     }
 
-    fn asked(&self, ask: impl Fn(&[&Band]) -> Verdict) -> Verdict {
+    fn asked<T>(&self, ask: impl FnOnce(&[&Band]) -> T) -> T {
         let bands = self.read();
         let bands: Vec<&Band> = bands.iter().map(|b| &**b).collect();
         ask(&bands)

@@ -2,7 +2,9 @@
 //!
 //! A tile is empty, or one plane of depth (a face covers all of it), or 256 depths. Depths only ever rise.
 //! Sixteen tiles make a cell of 64×64 pixels; a tile's minimum is exact whenever no tile is stale, a cell's
-//! minimum is the least of its tiles'. Pixels beyond the image hold +∞ and never hold a minimum down.
+//! minimum is the least of its tiles'. Of a tile of depths the minima of its sixteen blocks of 4×4 are kept too: one
+//! comparison settles all blocks that a rectangle holds whole, and only at its border pixels are looked at. Pixels
+//! beyond the image hold +∞ and never hold a minimum down.
 
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 
@@ -75,6 +77,15 @@ impl<S: Simd> PlaneRows<S> {
 
 pub(super) const COLUMNS: [f32; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
 
+/// The bits of a tile's blocks in columns and rows (inclusive) of them, from 0 to 3; none where the last comes before
+/// the first.
+#[inline(always)]
+fn blocks_in([x0, y0, x1, y1]: [i32; 4]) -> u32 {
+    let columns = (15u32 << x0) & (15 >> (3 - x1));
+    let rows = (0xFFFFu32 << (y0 * 4)) & (0xFFFF >> ((3 - y1) * 4));
+    ((columns & 15) * 0x1111) & rows
+}
+
 /// One row of a tile: a cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
@@ -100,6 +111,8 @@ pub(super) struct Surface {
     kind: Vec<Kind>,
     plane: Vec<TilePlane>,
     rows: Vec<Row>,
+    /// Of a tile of depths that is not stale, the smallest of each block of 4×4, row by row.
+    blocks: Vec<Row>,
     /// By cell, sixteen tiles each: smallest depth, and a bound on the largest.
     min: Vec<Row>,
     max: Vec<f32>,
@@ -126,6 +139,7 @@ impl Surface {
             kind: vec![Kind::Empty; tiles],
             plane: vec![TilePlane::ZERO; tiles],
             rows: vec![Row([0.0; 16]); tiles * 16],
+            blocks: vec![Row([0.0; 16]); tiles],
             min: vec![Row([0.0; 16]); cells_x * cells_y],
             max: vec![0.0; tiles],
             cell_min: vec![0.0; cells_x * cells_y],
@@ -188,11 +202,22 @@ impl Surface {
         self.min[tile / 16].0[tile % 16]
     }
 
-    /// As [`Surface::tile_min`], brought up to date first.
+    /// Whether a block of 4×4 pixels that columns and rows (inclusive) of a tile meet may hold less than `depth`; for
+    /// certain if the tile is not stale.
     #[inline(always)]
-    pub fn tile_min_now<S: Simd>(&mut self, simd: S, tile: usize) -> f32 {
-        self.refresh_tile(simd, tile);
-        self.tile_min(tile)
+    pub fn may_gain<S: Simd>(&self, simd: S, tile: usize, rect: [i32; 4], depth: f32) -> bool {
+        if self.tile_min(tile) >= depth {
+            return false;
+        }
+        match self.kind[tile] {
+            Kind::Empty => true,
+            Kind::Plane => self.plane[tile].min(rect[0], rect[1], rect[2], rect[3]) < depth,
+            Kind::Pixels if self.is_stale[tile] => true,
+            Kind::Pixels => {
+                let farther = f32x16::from_slice(simd, &self.blocks[tile].0).simd_lt(depth).to_bitmask();
+                farther as u32 & blocks_in([rect[0] >> 2, rect[1] >> 2, rect[2] >> 2, rect[3] >> 2]) != 0
+            }
+        }
     }
 
     #[inline(always)]
@@ -299,22 +324,25 @@ impl Surface {
             (rows.trailing_zeros() as usize & 15, (31 - (rows | 1).leading_zeros() as usize) & 15);
         let all = &mut self.rows[tile * 16..][..16];
         let zero = f32x16::splat(simd, 0.0);
-        let mut least = f32x16::splat(simd, f32::INFINITY);
-        for (at, row) in all.iter_mut().enumerate() {
-            let old = if fresh { zero } else { f32x16::from_slice(simd, &row.0) };
-            let mut new = old;
-            if at >= first && at <= last {
-                let covered = columns.simd_ge(from[at]) & columns.simd_le(to[at]);
-                new = covered.select(old.max(depths.row(simd, at)), old);
-                new.store_slice(&mut row.0);
-            } else if fresh {
-                zero.store_slice(&mut row.0);
+        let mut least = [f32x16::splat(simd, f32::INFINITY); 4];
+        for (quarter, four) in all.chunks_exact_mut(4).enumerate() {
+            for (at, row) in four.iter_mut().enumerate() {
+                let at = quarter * 4 + at;
+                let old = if fresh { zero } else { f32x16::from_slice(simd, &row.0) };
+                let mut new = old;
+                if at >= first && at <= last {
+                    let covered = columns.simd_ge(from[at]) & columns.simd_le(to[at]);
+                    new = covered.select(old.max(depths.row(simd, at)), old);
+                    new.store_slice(&mut row.0);
+                } else if fresh {
+                    zero.store_slice(&mut row.0);
+                }
+                least[quarter] = least[quarter].min(new);
             }
-            least = least.min(new);
         }
         self.max[tile] = self.max[tile].max(highest);
         self.raised_by[tile] = self.drawing;
-        self.set_min(simd, tile, least.reduce_min());
+        self.set_blocks(simd, tile, least);
     }
 
     /// Which tiles of a cell hold something that is not nearer than `depth`, of those that meet `rect`.
@@ -363,7 +391,7 @@ impl Surface {
     }
 
     #[inline(always)]
-    fn refresh_tile<S: Simd>(&mut self, simd: S, tile: usize) {
+    pub fn refresh_tile<S: Simd>(&mut self, simd: S, tile: usize) {
         if !self.is_stale[tile] {
             return;
         }
@@ -372,11 +400,23 @@ impl Surface {
             return;
         }
         let rows = &self.rows[tile * 16..tile * 16 + 16];
-        let mut least = f32x16::from_slice(simd, &rows[0].0);
-        for row in &rows[1..] {
-            least = least.min(f32x16::from_slice(simd, &row.0));
+        let mut least = [f32x16::splat(simd, f32::INFINITY); 4];
+        for (least, four) in least.iter_mut().zip(rows.chunks_exact(4)) {
+            for row in four {
+                *least = least.min(f32x16::from_slice(simd, &row.0));
+            }
         }
-        self.set_min(simd, tile, least.reduce_min());
+        self.set_blocks(simd, tile, least);
+    }
+
+    /// Keeps the minima of a tile of depths, given those of each column of four rows.
+    #[inline(always)]
+    fn set_blocks<S: Simd>(&mut self, simd: S, tile: usize, [a, b, c, d]: [f32x16<S>; 4]) {
+        let ((a, b), (c, d)) = (simd.deinterleave_f32x16(a, b), simd.deinterleave_f32x16(c, d));
+        let (pairs, others) = simd.deinterleave_f32x16(a.min(b), c.min(d));
+        let blocks = pairs.min(others);
+        blocks.store_slice(&mut self.blocks[tile].0);
+        self.set_min(simd, tile, blocks.reduce_min());
     }
 
     /// As [`Surface::all_nearer`], while minima may be stale (too far: still bounds): those that matter are
@@ -440,6 +480,19 @@ impl Surface {
         true
     }
 
+    /// Whether nothing in the tiles that a rectangle (inclusive) meets is as near as `depth`.
+    #[inline(always)]
+    pub fn is_behind(&self, [left, top, right, bottom]: [i32; 4], depth: f32) -> bool {
+        for y in top >> 4..=bottom >> 4 {
+            for x in left >> 4..=right >> 4 {
+                if self.max[self.tile(x, y)] >= depth {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
     #[inline(always)]
     fn tiles_are_nearer<S: Simd>(&self, simd: S, rect: [i32; 4], depth: f32) -> bool {
         let [left, top, right, bottom] = rect;
@@ -473,20 +526,32 @@ impl Surface {
         match self.kind[tile] {
             Kind::Empty => false,
             Kind::Plane => self.plane[tile].min(inner[0], inner[1], inner[2], inner[3]) > depth,
-            Kind::Pixels => self.rows_are_nearer(simd, tile, inner, depth),
+            Kind::Pixels => self.pixels_are_nearer(simd, tile, inner, depth),
         }
     }
 
+    /// As [`Surface::tile_is_nearer`] for columns and rows (inclusive) of a tile of depths.
     #[inline(always)]
-    fn rows_are_nearer<S: Simd>(&self, simd: S, tile: usize, rect: [i32; 4], depth: f32) -> bool {
+    fn pixels_are_nearer<S: Simd>(&self, simd: S, tile: usize, rect: [i32; 4], depth: f32) -> bool {
         let [x0, y0, x1, y1] = rect;
-        let columns = (0xFFFF << x0) & (0xFFFF >> (15 - x1));
         let threshold = f32x16::splat(simd, depth);
-        let rows = &self.rows[tile * 16 + y0 as usize..=tile * 16 + y1 as usize];
-        // Asked this way round, a depth that is no number is nearer than nothing. A loop, not a closure: those
-        // are not always inlined, and then lose the instruction set.
-        for row in rows {
-            let nearer = f32x16::from_slice(simd, &row.0).simd_gt(threshold).to_bitmask() as i32;
+        // Asked this way round, a depth that is no number is nearer than nothing.
+        let nearer = f32x16::from_slice(simd, &self.blocks[tile].0).simd_gt(threshold).to_bitmask() as u32;
+        let open = !nearer & blocks_in([x0 >> 2, y0 >> 2, x1 >> 2, y1 >> 2]);
+        if open == 0 {
+            return true;
+        }
+        if open & blocks_in([(x0 + 3) >> 2, (y0 + 3) >> 2, ((x1 + 1) >> 2) - 1, ((y1 + 1) >> 2) - 1]) != 0 {
+            return false;
+        }
+        let columns = (0xFFFF << x0) & (0xFFFF >> (15 - x1));
+        let rows = &self.rows[tile * 16..][..16];
+        for y in y0..=y1 {
+            if open >> (y & 12) & 15 == 0 {
+                continue;
+            }
+            let row = f32x16::from_slice(simd, &rows[y as usize & 15].0);
+            let nearer = row.simd_gt(threshold).to_bitmask() as i32;
             if nearer & columns != columns {
                 return false;
             }
@@ -525,5 +590,91 @@ impl Surface {
             }
         }
         self.refresh(simd);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::trouble::Random;
+    use fearless_simd::{Level, dispatch};
+
+    /// A surface of planes, spans of rows and single rows, in any order.
+    #[inline(always)]
+    fn scribble<S: Simd>(simd: S, random: &mut Random) -> Surface {
+        let mut surface = Surface::new(1 + random.below(150), 0, 1 + random.below(150));
+        let (tiles_x, tiles_y) = ((surface.width + 15) >> 4, (surface.height + 15) >> 4);
+        for _ in 0..random.below(60) {
+            let [x, y] = [tiles_x, tiles_y].map(|n| random.below(n as u32) as i32);
+            let tile = surface.tile(x, y);
+            let mut slope = || random.between(-0.02, 0.02) as f32;
+            let (per_column, per_row) = (slope(), slope());
+            let plane = TilePlane { origin: random.between(0.31, 0.7) as f32, per_column, per_row };
+            match random.below(3) {
+                0 => surface.cover(simd, tile, plane),
+                1 => {
+                    let from = f32x16::splat(simd, random.below(16) as f32);
+                    let to = f32x16::splat(simd, random.below(16) as f32);
+                    surface.raise_spans(simd, tile, [from, to], 1 + random.below(0xFFFF), plane, plane.max());
+                }
+                _ => {
+                    surface.open(simd, tile);
+                    let (row, mask) = (random.below(16) as i32, u64::from(random.below(0x10000)));
+                    let mask = mask32x16::from_bitmask(simd, mask);
+                    surface.raise(simd, tile, row, plane.row(simd, row), mask);
+                    surface.raised(tile, plane.max());
+                }
+            }
+        }
+        surface
+    }
+
+    #[inline(always)]
+    fn ask_as_pixels_say<S: Simd>(simd: S, random: &mut Random) -> [u32; 3] {
+        let mut surface = scribble(simd, random);
+        let mut asked = [0; 3];
+        let mut side = |size: i32| {
+            let (a, b) = (random.below(size as u32) as i32, random.below(size as u32) as i32);
+            // Often a few pixels only.
+            let b = if random.one_in(2) { (a + b % 9).min(size - 1) } else { b };
+            [a.min(b), a.max(b)]
+        };
+        for question in 0..200 {
+            let ([left, right], [top, bottom]) = (side(surface.width), side(surface.height));
+            let rect = [left, top, right, bottom];
+            let depth = [0.0, 0.3, 0.45, 0.6][question & 3];
+            let pixels = (top..=bottom).flat_map(|y| (left..=right).map(move |x| (x as u32, y as u32)));
+            let truth = pixels.clone().all(|(x, y)| surface.depth(x, y) > depth);
+            // The first half while minima are stale.
+            if question < 100 {
+                assert_eq!(surface.all_nearer_now(simd, rect, depth), truth, "{rect:?} {depth}");
+            } else {
+                surface.refresh(simd);
+                assert_eq!(surface.all_nearer(simd, rect, depth), truth, "{rect:?} {depth}");
+            }
+            asked[usize::from(truth)] += 1;
+            if surface.is_behind(rect, depth) {
+                assert!(pixels.clone().all(|(x, y)| surface.depth(x, y) < depth), "{rect:?} {depth}");
+                asked[2] += 1;
+            }
+            let (tile, inner) =
+                (surface.tile(left >> 4, top >> 4), [left & 15, top & 15, left & 15, top & 15]);
+            let farther = surface.depth(left as u32, top as u32) < depth;
+            assert!(surface.may_gain(simd, tile, inner, depth) || !farther, "{rect:?} {depth}");
+        }
+        asked
+    }
+
+    #[test]
+    fn what_is_said_of_rectangles_is_what_their_pixels_say() {
+        for level in [Level::new(), Level::baseline()] {
+            let random = &mut Random::new(5);
+            let mut asked = [0; 3];
+            for _ in 0..400 {
+                let more = dispatch!(level, simd => ask_as_pixels_say(simd, random));
+                asked.iter_mut().zip(more).for_each(|(sum, n)| *sum += n);
+            }
+            assert!(asked.iter().all(|&n| n > 1000), "{asked:?}");
+        }
     }
 }

@@ -35,7 +35,11 @@ fn point_of_pixel(random: &mut Random, x: u32, y: u32) -> (f64, f64) {
 /// Asserts that rays through covered pixels meet something no farther than what the pixels hold; returns the
 /// numbers of pixels covered and of rays.
 fn attack(scene: &Scene, view: &View, random: &mut Random, rays: u32, what: &str) -> (u64, u64) {
-    let buffer = drawn(scene, view, &OcclusionOptions::default());
+    let buffer = if random.one_in(4) {
+        drawn_plainly(scene, view)
+    } else {
+        drawn(scene, view, &OcclusionOptions::default())
+    };
     let sight = Sight::new(scene, view);
     let (mut covered, mut shot) = (0, 0);
     for y in 0..view.height {
@@ -442,10 +446,43 @@ fn balls_rectangles_and_meshes_agree_with_boxes() {
         }
     }
     assert!(counts.iter().all(|&c| c > 100), "{counts:?}");
+    many_are_judged_as_each(&buffer, &wall, random);
     let middle = |depth| ScreenRect { left: 70.0, top: 50.0, right: 90.0, bottom: 70.0, depth };
     assert_eq!(buffer.ask_rect(&middle(0.01)), Verdict::Hidden);
     assert_eq!(buffer.ask_rect(&middle(0.5)), Verdict::Visible);
     assert_eq!(buffer.ask_rect(&ScreenRect { left: 161.0, right: 170.0, ..middle(0.5) }), Verdict::Outside);
+}
+
+fn many_are_judged_as_each(buffer: &OcclusionBuffer, mesh: &Occluder, random: &mut Random) {
+    let balls: Vec<Ball> = (0..300)
+        .map(|_| Ball { center: random.point(5.0) - DVec3::Z * 4.0, radius: random.between(0.01, 1.0) })
+        .collect();
+    let rect = |random: &mut Random| {
+        let (left, top) = (random.between(-20.0, 170.0), random.between(-20.0, 130.0));
+        let (right, bottom) = (left + random.between(0.0, 30.0), top + random.between(0.0, 30.0));
+        ScreenRect { left, top, right, bottom, depth: random.between(0.0, 0.1) as f32 }
+    };
+    let rects: Vec<ScreenRect> = (0..300).map(|_| rect(random)).collect();
+    let placed = |ball: &Ball| {
+        let scale = DVec3::splat(ball.radius);
+        let world_from_object =
+            DAffine3::from_scale_rotation_translation(scale, glam::DQuat::IDENTITY, ball.center);
+        PlacedMesh { mesh, world_from_object }
+    };
+    let meshes: Vec<PlacedMesh> = balls.iter().map(placed).collect();
+    let mut many = [vec![Verdict::Visible], Vec::new(), Vec::new()];
+    buffer.ask_balls(&balls, &mut many[0]);
+    buffer.ask_rects(&rects, &mut many[1]);
+    buffer.ask_meshes(&meshes, &mut many[2]);
+    let each = [
+        balls.iter().map(|b| buffer.ask_sphere(b.center, b.radius)).collect::<Vec<_>>(),
+        rects.iter().map(|r| buffer.ask_rect(r)).collect(),
+        meshes.iter().map(|m| buffer.ask_mesh(m.mesh, &m.world_from_object)).collect(),
+    ];
+    assert_eq!(many, each);
+    for verdicts in &many {
+        assert!(verdicts.contains(&Verdict::Visible) && verdicts.contains(&Verdict::Hidden), "{verdicts:?}");
+    }
 }
 
 #[test]

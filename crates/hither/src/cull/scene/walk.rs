@@ -6,7 +6,6 @@ use crate::index::{Child, GroupIndex, SceneIndex, Slot, WideNode, WideTree};
 use crate::raster::ScreenFromObject;
 use crate::scene::Content;
 use fearless_simd::Simd;
-use std::cmp::Ordering;
 use std::collections::{BinaryHeap, HashMap, HashSet};
 
 /// A mesh's box of so many pixels is worth one more question about the boxes inside.
@@ -28,44 +27,46 @@ struct Context<'a> {
 /// A child of a group's tree that the view may show.
 #[derive(Clone, Copy)]
 struct Open {
-    depth: f32,
+    /// No point of it is nearer, and none is farther.
+    nearest: f32,
+    farthest: f32,
     slot: Slot,
     context: u32,
     moving: bool,
     rect: [i32; 4],
-    /// Whether it may reach beyond the picture to where a moving eye would see it.
-    cut: bool,
+    /// Whether no border of the picture cuts it, for any eye that may come.
+    whole: bool,
 }
 
-impl Ord for Open {
-    /// The nearest is the greatest; the rest only makes the order the same every time.
-    fn cmp(&self, o: &Open) -> Ordering {
-        let key = |e: &Open| (e.context, e.rect);
-        self.depth.total_cmp(&o.depth).then_with(|| key(o).cmp(&key(self)))
+/// What is to be looked at, the nearest first; of what is equally near, what was found first.
+#[derive(Default)]
+struct Queue {
+    /// The bits of a depth above the complement of a place in `found`: small, as they are moved about a lot.
+    order: BinaryHeap<u64>,
+    found: Vec<Open>,
+}
+
+impl Queue {
+    #[inline(always)]
+    fn push(&mut self, open: Open) {
+        // Depths that are 0 or more are ordered as their bits are.
+        let key = u64::from(open.nearest.to_bits()) << 32 | u64::from(!(self.found.len() as u32));
+        self.order.push(key);
+        self.found.push(open);
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<(u32, Open)> {
+        let place = !(self.order.pop()? as u32);
+        Some((place, self.found[place as usize]))
     }
 }
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, o: &Open) -> Option<Ordering> {
-        Some(self.cmp(o))
-    }
-}
-
-impl PartialEq for Open {
-    fn eq(&self, o: &Open) -> bool {
-        self.cmp(o) == Ordering::Equal
-    }
-}
-
-impl Eq for Open {}
 
 /// An instance that may be seen, as far as is known.
 struct Seen {
     instance: u32,
-    /// Where its box lies and how near it comes; `cut` if it may not be hidden, whatever is there.
-    rect: [i32; 4],
-    depth: f32,
-    cut: bool,
+    /// Its place in the queue.
+    open: u32,
     /// How many occluders had been drawn when it was judged.
     occluders: u64,
 }
@@ -77,7 +78,7 @@ struct Walk<'a> {
     options: &'a CullOptions,
     band: &'a mut Band,
     contexts: Vec<Context<'a>>,
-    open: BinaryHeap<Open>,
+    queue: Queue,
     seen: Vec<Seen>,
     /// Nodes of a mesh's tree to look at.
     stack: Vec<u32>,
@@ -108,7 +109,7 @@ pub(super) fn cull<S: Simd>(
         options,
         band,
         contexts: Vec::new(),
-        open: BinaryHeap::new(),
+        queue: Queue::default(),
         seen: Vec::new(),
         stack: Vec::new(),
         drawn: HashSet::new(),
@@ -124,9 +125,9 @@ pub(super) fn cull<S: Simd>(
         }
     }
     walk.enter(simd, index.scene().root, frame.screen_from_world, 0);
-    while let Some(open) = walk.open.pop() {
+    while let Some((place, open)) = walk.queue.pop() {
         walk.counters.boxes_asked += 1;
-        if !open.cut && walk.band.hides(simd, open.rect, open.depth) {
+        if walk.is_hidden(simd, &open) {
             walk.counters.boxes_hidden += 1;
             walk.credit(open.rect);
             walk.judge(open.context, open.slot, open.moving, Reason::BoxHidden);
@@ -134,7 +135,7 @@ pub(super) fn cull<S: Simd>(
         }
         match open.slot.child() {
             Child::Node(node) => walk.visit(simd, open.context, open.moving, node),
-            Child::Leaf(item) => walk.visit_item(simd, &open, item),
+            Child::Leaf(item) => walk.visit_item(simd, place, &open, item),
         }
     }
     walk.finish(simd)
@@ -182,27 +183,37 @@ impl<'a> Walk<'a> {
                 self.judge(context, node.child[lane], moving, Reason::OutsideView);
                 continue;
             }
-            self.open.push(Open {
-                depth: boxes.depth[lane],
+            self.queue.push(Open {
+                nearest: boxes.depth[lane],
+                farthest: boxes.farthest[lane],
                 slot: node.child[lane],
                 context,
                 moving,
                 rect: [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]],
-                cut: view.margin[0] > 0.0 && boxes.uncut >> lane & 1 == 0,
+                whole: boxes.uncut >> lane & 1 == 1,
             });
         }
     }
 
     #[inline(always)]
-    fn visit_item<S: Simd>(&mut self, simd: S, open: &Open, item: u32) {
+    fn visit_item<S: Simd>(&mut self, simd: S, place: u32, open: &Open, item: u32) {
         let c = &self.contexts[open.context as usize];
-        let item = &c.group.items[item as usize];
+        let (item, group_at) = (&c.group.items[item as usize], c.at);
         let [left, top, right, bottom] = open.rect;
         let pixels = ((right - left + 1) * (bottom - top + 1)) as u32;
-        if pixels <= PX_OF_A_SPECK && open.depth < f32::INFINITY && matches!(item.content, Content::Mesh(_)) {
-            return self.take_for_visible(open, c.first + item.first_instance, Reason::Shows);
+        let instance = c.first + item.first_instance;
+        if let Content::Mesh(mesh) = item.content
+            && open.nearest < f32::INFINITY
+            && (pixels <= PX_OF_A_SPECK || open.whole && self.band.is_behind(open.rect, open.farthest))
+        {
+            // Nothing is before it yet: its smaller boxes would show like its own.
+            self.take_for_visible(place, instance, Reason::Shows);
+            if pixels >= self.options.least_occluder_px && pixels > PX_OF_A_SPECK {
+                self.draw(simd, instance, mesh, group_at.after(&item.group_from_content));
+            }
+            return;
         }
-        let (at, instance) = (c.at.after(&item.group_from_content), c.first + item.first_instance);
+        let at = group_at.after(&item.group_from_content);
         let mesh = match item.content {
             Content::Group(group) => return self.enter(simd, group, at, instance),
             Content::Mesh(mesh) => mesh,
@@ -211,12 +222,18 @@ impl<'a> Walk<'a> {
         match self.mesh_shows(simd, mesh, &at, pixels) {
             Shows::No(reason) => self.judge_one(instance, reason),
             Shows::Yes(reason) => {
-                self.take_for_visible(open, instance, reason);
-                if pixels >= self.options.least_occluder_px && !self.drawn.contains(&instance) {
+                self.take_for_visible(place, instance, reason);
+                if pixels >= self.options.least_occluder_px {
                     self.draw(simd, instance, mesh, at);
                 }
             }
         }
+    }
+
+    /// Whether what was drawn hides a box; never if it may be seen by an eye that moves, beyond the picture.
+    #[inline(always)]
+    fn is_hidden<S: Simd>(&self, simd: S, open: &Open) -> bool {
+        (open.whole || self.frame.margin().is_none()) && self.band.hides(simd, open.rect, open.nearest)
     }
 
     /// Counts a hidden box for the occluder that hides it.
@@ -228,18 +245,16 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn take_for_visible(&mut self, open: &Open, instance: u32, reason: Reason) {
+    fn take_for_visible(&mut self, open: u32, instance: u32, reason: Reason) {
         self.judge_one(instance, reason);
-        let occluders = self.counters.occluders;
-        let &Open { rect, depth, cut, .. } = open;
-        self.seen.push(Seen { instance, rect, depth, cut, occluders });
+        self.seen.push(Seen { instance, open, occluders: self.counters.occluders });
     }
 
     /// Draws an instance's opaque surface.
     #[inline(always)]
     fn draw<S: Simd>(&mut self, simd: S, instance: u32, mesh: u32, at: ScreenFromObject) {
         let occluder = &self.occluders[mesh as usize];
-        if occluder.is_empty() {
+        if occluder.is_empty() || self.drawn.contains(&instance) {
             return;
         }
         if !self.idle.is_empty() && self.idle.contains_key(&instance) {
@@ -354,14 +369,16 @@ impl<'a> Walk<'a> {
         let seen = std::mem::take(&mut self.seen);
         let mut visible = Vec::with_capacity(seen.len());
         for one in &seen {
+            let open = &self.queue.found[one.open as usize];
             // Something was drawn since, and it may be hidden.
-            let anew = one.occluders != self.counters.occluders && !one.cut;
-            if !(anew && self.band.hides(simd, one.rect, one.depth)) {
+            let anew = one.occluders != self.counters.occluders;
+            if !(anew && self.is_hidden(simd, open)) {
                 visible.push(one.instance);
                 continue;
             }
             self.counters.second_thoughts += 1;
-            self.credit(one.rect);
+            let rect = open.rect;
+            self.credit(rect);
             if self.options.reasons {
                 self.judged.retain(|j| j.instances != (one.instance..one.instance + 1));
                 self.judge_one(one.instance, Reason::HiddenAfterAll);
