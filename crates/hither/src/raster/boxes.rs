@@ -122,7 +122,6 @@ fn project_some<S: Simd>(
     boxes: &mut ProjectedBoxes,
 ) {
     let splat = |v: f32| S::f32s::splat(simd, v);
-    let (x, y) = (corners(&set.x, lo, hi), corners(&set.y, lo, hi));
     let (lowest, depth, safe, before_near);
     let mut low = [splat(0.0); 2];
     let mut high = [splat(0.0); 2];
@@ -135,6 +134,7 @@ fn project_some<S: Simd>(
         safe = lowest.simd_gt(near.max(splat(set.error[2] * 8.0)));
         before_near = highest.simd_ge(near * 0.999_999);
         depth = near / lowest * 1.000_001;
+        let (x, y) = (corners(&set.x, lo, hi), corners(&set.y, lo, hi));
         for c in 0..8 {
             let reciprocal = splat(1.0) / w[c];
             let (qx, qy) = (x[c] * reciprocal, y[c] * reciprocal);
@@ -153,6 +153,7 @@ fn project_some<S: Simd>(
         let farthest = smallest(&d) - set.error[3];
         before_near = farthest.simd_le(splat(1.0)) & nearest.simd_gt(splat(0.0));
         depth = nearest;
+        let (x, y) = (corners(&set.x, lo, hi), corners(&set.y, lo, hi));
         low = [smallest(&x), smallest(&y)];
         high = [largest(&x), largest(&y)];
     }
@@ -176,7 +177,7 @@ fn project_some<S: Simd>(
     let crossing = !safe & meets;
     let mut alive = meets.to_bitmask() as u16;
     if crossing.any_true() {
-        alive &= !outside_sides(simd, set, &x, &y, lo, hi, window) | !(crossing.to_bitmask() as u16);
+        alive &= !outside_sides(simd, set, lo, hi, window) | !(crossing.to_bitmask() as u16);
     }
     boxes.alive |= alive << from;
     let to = from + S::f32s::LEN;
@@ -200,30 +201,40 @@ fn everywhere(window: Rect) -> ProjectedBoxes {
     }
 }
 
-/// Boxes that lie wholly beyond one of the window's sides (planes through the eye).
+/// Boxes that lie wholly beyond one of the window's sides (planes through the eye). Rarely asked, so that it finds
+/// the corners again, in a function of its own: kept for it, they would take the registers of what is asked always.
+#[inline(never)]
+fn outside_sides<S: Simd>(simd: S, set: &BoxSet, lo: &[S::f32s; 3], hi: &[S::f32s; 3], window: Rect) -> u16 {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let w = if set.perspective { corners(&set.w, lo, hi) } else { [S::f32s::splat(simd, 1.0); 8] };
+            let across = [set.error[0], window.left as f32, window.right as f32];
+            let down = [set.error[1], window.top as f32, window.bottom as f32];
+            beyond(simd, set, &corners(&set.x, lo, hi), &w, across)
+                | beyond(simd, set, &corners(&set.y, lo, hi), &w, down)
+        },
+    )
+}
+
+/// Boxes that lie wholly before `first` or beyond `last`, with the corners' numerators `p` and their `error`.
 #[inline(always)]
-fn outside_sides<S: Simd>(
+fn beyond<S: Simd>(
     simd: S,
     set: &BoxSet,
-    x: &[S::f32s; 8],
-    y: &[S::f32s; 8],
-    lo: &[S::f32s; 3],
-    hi: &[S::f32s; 3],
-    window: Rect,
+    p: &[S::f32s; 8],
+    w: &[S::f32s; 8],
+    [error, first, last]: [f32; 3],
 ) -> u16 {
-    let w = if set.perspective { corners(&set.w, lo, hi) } else { [S::f32s::splat(simd, 1.0); 8] };
     let mut outside = 0u16;
-    let sides = [(x, set.error[0], window.left, window.right), (y, set.error[1], window.top, window.bottom)];
-    for (p, error, first, last) in sides {
-        for (bound, sign) in [(first as f32, 1.0f32), (last as f32, -1.0f32)] {
-            let slack = error + bound.abs() * set.error[2];
-            let mut most = S::f32s::splat(simd, f32::NEG_INFINITY);
-            for c in 0..8 {
-                most = most.max((p[c] - w[c] * bound) * sign);
-            }
-            // Twice the bound, for the rounding of the difference itself.
-            outside |= most.simd_lt(S::f32s::splat(simd, -2.0 * slack)).to_bitmask() as u16;
+    for (bound, sign) in [(first, 1.0f32), (last, -1.0f32)] {
+        let slack = error + bound.abs() * set.error[2];
+        let mut most = S::f32s::splat(simd, f32::NEG_INFINITY);
+        for c in 0..8 {
+            most = most.max((p[c] - w[c] * bound) * sign);
         }
+        // Twice the bound, for the rounding of the difference itself.
+        outside |= most.simd_lt(S::f32s::splat(simd, -2.0 * slack)).to_bitmask() as u16;
     }
     outside
 }

@@ -227,8 +227,8 @@ fn set_up_chunk<S: Simd>(
         if draw == 0 {
             return;
         }
-        for k in 0..4 {
-            lanes.covers[k] |= ((covers[k] & tiny) << from) as u16;
+        for (all, these) in lanes.covers.iter_mut().zip(covers) {
+            *all |= ((these & tiny) << from) as u16;
         }
     }
     lanes.draw |= (draw << from) as u16;
