@@ -13,7 +13,7 @@
 use super::box_corners::{axes, corners, largest, smallest};
 use super::pyramid::Rect;
 use super::transform::ScreenFromObject;
-use fearless_simd::{Simd, f32x16, prelude::*};
+use fearless_simd::{Simd, prelude::*};
 
 /// One object's transform, prepared for its boxes.
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +45,19 @@ pub struct ProjectedBoxes {
     pub alive: u16,
 }
 
+impl Default for ProjectedBoxes {
+    fn default() -> ProjectedBoxes {
+        ProjectedBoxes {
+            left: [0; 16],
+            top: [0; 16],
+            right: [0; 16],
+            bottom: [0; 16],
+            depth: [0.0; 16],
+            alive: 0,
+        }
+    }
+}
+
 impl BoxSet {
     /// Prepares `at` for boxes whose coordinates are at most `reach` in magnitude.
     // Called from code for one instruction set, into which closures would not be inlined.
@@ -70,8 +83,10 @@ impl BoxSet {
     }
 }
 
-// A kernel, long because its steps share sixteen boxes' worth of registers.
 /// Projects boxes given as `min` and `max` (axis, lane) into `window` (image coordinates).
+///
+/// As many at once as a register holds: sixteen have 48 corners' coordinates, for which half as wide registers
+/// have no room.
 #[inline(always)]
 pub fn project_boxes<S: Simd>(
     simd: S,
@@ -79,26 +94,49 @@ pub fn project_boxes<S: Simd>(
     min: &[[f32; 16]; 3],
     max: &[[f32; 16]; 3],
     window: Rect,
-) -> ProjectedBoxes {
+    boxes: &mut ProjectedBoxes,
+) {
     if !set.in_range {
-        return everywhere(window);
+        *boxes = everywhere(window);
+        return;
     }
-    let (lo, hi) = (axes(simd, min), axes(simd, max));
-    let (x, y) = (corners(&set.x, &lo, &hi), corners(&set.y, &lo, &hi));
+    boxes.alive = 0;
+    let mut from = 0;
+    while from < 16 {
+        let (lo, hi) = (axes(simd, min, from), axes(simd, max, from));
+        project_some(simd, set, &lo, &hi, window, from, boxes);
+        from += S::f32s::LEN;
+    }
+}
+
+// A kernel, long because its steps share the corners' coordinates.
+/// Projects a vector's worth of boxes, and puts them at lanes `from` and on.
+#[inline(always)]
+fn project_some<S: Simd>(
+    simd: S,
+    set: &BoxSet,
+    lo: &[S::f32s; 3],
+    hi: &[S::f32s; 3],
+    window: Rect,
+    from: usize,
+    boxes: &mut ProjectedBoxes,
+) {
+    let splat = |v: f32| S::f32s::splat(simd, v);
     let (lowest, depth, safe, before_near);
-    let mut low = [f32x16::splat(simd, 0.0); 2];
-    let mut high = [f32x16::splat(simd, 0.0); 2];
+    let mut low = [splat(0.0); 2];
+    let mut high = [splat(0.0); 2];
     if set.perspective {
-        let w = corners(&set.w, &lo, &hi);
+        let w = corners(&set.w, lo, hi);
         lowest = smallest(&w) - set.error[2];
         let highest = largest(&w) + set.error[2];
-        let near = f32x16::splat(simd, set.d[3]);
+        let near = splat(set.d[3]);
         // Relative error of W below 1/8, else the box counts as crossing the near plane.
-        safe = lowest.simd_gt(near.max(f32x16::splat(simd, set.error[2] * 8.0)));
+        safe = lowest.simd_gt(near.max(splat(set.error[2] * 8.0)));
         before_near = highest.simd_ge(near * 0.999_999);
         depth = near / lowest * 1.000_001;
+        let (x, y) = (corners(&set.x, lo, hi), corners(&set.y, lo, hi));
         for c in 0..8 {
-            let reciprocal = f32x16::splat(simd, 1.0) / w[c];
+            let reciprocal = splat(1.0) / w[c];
             let (qx, qy) = (x[c] * reciprocal, y[c] * reciprocal);
             if c == 0 {
                 (low, high) = ([qx, qy], [qx, qy]);
@@ -108,17 +146,18 @@ pub fn project_boxes<S: Simd>(
             }
         }
     } else {
-        let d = corners(&set.d, &lo, &hi);
+        let d = corners(&set.d, lo, hi);
         let nearest = largest(&d) + set.error[3];
-        lowest = f32x16::splat(simd, 1.0);
-        safe = nearest.simd_le(f32x16::splat(simd, 1.0));
+        lowest = splat(1.0);
+        safe = nearest.simd_le(splat(1.0));
         let farthest = smallest(&d) - set.error[3];
-        before_near = farthest.simd_le(f32x16::splat(simd, 1.0)) & nearest.simd_gt(f32x16::splat(simd, 0.0));
+        before_near = farthest.simd_le(splat(1.0)) & nearest.simd_gt(splat(0.0));
         depth = nearest;
+        let (x, y) = (corners(&set.x, lo, hi), corners(&set.y, lo, hi));
         low = [smallest(&x), smallest(&y)];
         high = [largest(&x), largest(&y)];
     }
-    let mut edges = [f32x16::splat(simd, 0.0); 4];
+    let mut edges = [splat(0.0); 4];
     let mut meets = before_near;
     let sizes = [(window.left, window.right), (window.top, window.bottom)];
     for k in 0..2 {
@@ -127,27 +166,26 @@ pub fn project_boxes<S: Simd>(
         let margin =
             (farthest_off * set.error[2] + set.error[k]) / lowest + farthest_off * (1.0 / (1 << 21) as f32);
         // Pixel p's centre is p + 1/2; 1/256 covers snapping.
-        let from = (low[k] - margin - (0.5 + 1.0 / 256.0)).ceil().max(f32x16::splat(simd, first));
-        let to = (high[k] + margin - (0.5 - 1.0 / 256.0)).floor().min(f32x16::splat(simd, last));
+        let begin = (low[k] - margin - (0.5 + 1.0 / 256.0)).ceil().max(splat(first));
+        let end = (high[k] + margin - (0.5 - 1.0 / 256.0)).floor().min(splat(last));
         // The whole window where the box may cross the near plane.
-        edges[k] = safe.select(from, f32x16::splat(simd, first)) - first;
-        edges[k + 2] = safe.select(to, f32x16::splat(simd, last)) - first;
+        edges[k] = safe.select(begin, splat(first)) - first;
+        edges[k + 2] = safe.select(end, splat(last)) - first;
         meets &= edges[k].simd_le(edges[k + 2]);
     }
     // Boxes that cross the near plane are still tested against the window's four sides.
     let crossing = !safe & meets;
     let mut alive = meets.to_bitmask() as u16;
     if crossing.any_true() {
-        alive &= !outside_sides(simd, set, &x, &y, &lo, &hi, window) | !(crossing.to_bitmask() as u16);
+        alive &= !outside_sides(simd, set, lo, hi, window) | !(crossing.to_bitmask() as u16);
     }
-    ProjectedBoxes {
-        left: store_whole(edges[0]),
-        top: store_whole(edges[1]),
-        right: store_whole(edges[2]),
-        bottom: store_whole(edges[3]),
-        depth: store(safe.select(depth, f32x16::splat(simd, f32::INFINITY))),
-        alive,
-    }
+    boxes.alive |= alive << from;
+    let to = from + S::f32s::LEN;
+    edges[0].to_int::<S::i32s>().store_slice(&mut boxes.left[from..to]);
+    edges[1].to_int::<S::i32s>().store_slice(&mut boxes.top[from..to]);
+    edges[2].to_int::<S::i32s>().store_slice(&mut boxes.right[from..to]);
+    edges[3].to_int::<S::i32s>().store_slice(&mut boxes.bottom[from..to]);
+    safe.select(depth, splat(f32::INFINITY)).store_slice(&mut boxes.depth[from..to]);
 }
 
 /// The answer that is always safe.
@@ -163,44 +201,40 @@ fn everywhere(window: Rect) -> ProjectedBoxes {
     }
 }
 
-/// Boxes that lie wholly beyond one of the window's sides (planes through the eye).
+/// Boxes that lie wholly beyond one of the window's sides (planes through the eye). Rarely asked, so that it finds
+/// the corners again, in a function of its own: kept for it, they would take the registers of what is asked always.
+#[inline(never)]
+fn outside_sides<S: Simd>(simd: S, set: &BoxSet, lo: &[S::f32s; 3], hi: &[S::f32s; 3], window: Rect) -> u16 {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let w = if set.perspective { corners(&set.w, lo, hi) } else { [S::f32s::splat(simd, 1.0); 8] };
+            let across = [set.error[0], window.left as f32, window.right as f32];
+            let down = [set.error[1], window.top as f32, window.bottom as f32];
+            beyond(simd, set, &corners(&set.x, lo, hi), &w, across)
+                | beyond(simd, set, &corners(&set.y, lo, hi), &w, down)
+        },
+    )
+}
+
+/// Boxes that lie wholly before `first` or beyond `last`, with the corners' numerators `p` and their `error`.
 #[inline(always)]
-fn outside_sides<S: Simd>(
+fn beyond<S: Simd>(
     simd: S,
     set: &BoxSet,
-    x: &[f32x16<S>; 8],
-    y: &[f32x16<S>; 8],
-    lo: &[f32x16<S>; 3],
-    hi: &[f32x16<S>; 3],
-    window: Rect,
+    p: &[S::f32s; 8],
+    w: &[S::f32s; 8],
+    [error, first, last]: [f32; 3],
 ) -> u16 {
-    let w = if set.perspective { corners(&set.w, lo, hi) } else { [f32x16::splat(simd, 1.0); 8] };
     let mut outside = 0u16;
-    let sides = [(x, set.error[0], window.left, window.right), (y, set.error[1], window.top, window.bottom)];
-    for (p, error, first, last) in sides {
-        for (bound, sign) in [(first as f32, 1.0f32), (last as f32, -1.0f32)] {
-            let slack = error + bound.abs() * set.error[2];
-            let mut most = f32x16::splat(simd, f32::NEG_INFINITY);
-            for c in 0..8 {
-                most = most.max((p[c] - w[c] * bound) * sign);
-            }
-            // Twice the bound, for the rounding of the difference itself.
-            outside |= most.simd_lt(f32x16::splat(simd, -2.0 * slack)).to_bitmask() as u16;
+    for (bound, sign) in [(first, 1.0f32), (last, -1.0f32)] {
+        let slack = error + bound.abs() * set.error[2];
+        let mut most = S::f32s::splat(simd, f32::NEG_INFINITY);
+        for c in 0..8 {
+            most = most.max((p[c] - w[c] * bound) * sign);
         }
+        // Twice the bound, for the rounding of the difference itself.
+        outside |= most.simd_lt(S::f32s::splat(simd, -2.0 * slack)).to_bitmask() as u16;
     }
     outside
-}
-
-#[inline(always)]
-fn store<S: Simd>(v: f32x16<S>) -> [f32; 16] {
-    let mut out = [0.0; 16];
-    v.store_slice(&mut out);
-    out
-}
-
-#[inline(always)]
-fn store_whole<S: Simd>(v: f32x16<S>) -> [i32; 16] {
-    let mut out = [0; 16];
-    v.to_int::<fearless_simd::i32x16<S>>().store_slice(&mut out);
-    out
 }

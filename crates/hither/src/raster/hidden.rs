@@ -27,8 +27,11 @@ impl Target {
             return true;
         }
         let rect = [left, top, right, bottom];
+        // What is far away is this small: it asks the pixels themselves.
+        if right - left < 2 && bottom - top < 2 && self.visits.is_none() {
+            return !self.shows_in_pixels(rect, depth);
+        }
         if (right >> 2) - (left >> 2) < 2 && (bottom >> 2) - (top >> 2) < 2 {
-            // What is far away is this small: it asks the pixels themselves.
             return !self.shows_in_blocks(simd, rect, depth);
         }
         // Finest level at which the rectangle meets at most 2×2 parents: parents at level k have side
@@ -62,6 +65,22 @@ impl Target {
         true
     }
 
+    /// Whether some pixel of `[left, top, right, bottom]` (inclusive), at most 2×2, holds `depth` or something
+    /// farther.
+    #[inline(always)]
+    fn shows_in_pixels(&self, rect: [i32; 4], depth: f32) -> bool {
+        let [left, top, right, bottom] = rect;
+        let mut shown = false;
+        // Where there are fewer than four, one comes again: that costs less than to find out.
+        for (x, y) in [(left, top), (right, top), (left, bottom), (right, bottom)] {
+            let tile = (y >> 4) as usize * self.tiles_x + (x >> 4) as usize;
+            let block = tile * 16 + ((y & 12) + (x >> 2 & 3)) as usize;
+            let pixel = ((y & 3) * 4 + (x & 3)) as usize;
+            shown |= !self.touched[tile] | (self.depth[block].0[pixel] <= depth);
+        }
+        shown
+    }
+
     /// Whether some pixel of `[left, top, right, bottom]` (inclusive), which meets at most 2×2 blocks, holds
     /// `depth` or something farther. Without a branch: which blocks there are cannot be foreseen.
     #[inline(always)]
@@ -70,6 +89,9 @@ impl Target {
         let (bx, by) = ([left >> 2, right >> 2], [top >> 2, bottom >> 2]);
         let columns = span(left - bx[0] * 4, right + 1 - bx[0] * 4);
         let rows = span(top - by[0] * 4, bottom + 1 - by[0] * 4);
+        if self.visits.is_some() {
+            self.count_visits_of_blocks(bx, by, columns, rows);
+        }
         let depth = f32x16::splat(simd, depth);
         let mut shown = 0;
         for i in 0..4 {
@@ -81,11 +103,19 @@ impl Target {
             let block = tile * 16 + ((y & 3) * 4 + (x & 3)) as usize;
             let values = f32x16::from_slice(simd, &self.depth[block].0);
             shown |= (values.simd_le(depth).to_bitmask() as u32 | untouched) & pixels;
-            if let Some(visits) = &mut self.visits {
-                add_visits(&mut visits.cubes, self.width, self.height, (x * 4, y * 4), 1, pixels);
-            }
         }
         shown != 0
+    }
+
+    /// Counts a visit of the pixels in these columns and rows of 2×2 blocks.
+    #[inline(never)]
+    fn count_visits_of_blocks(&mut self, bx: [i32; 2], by: [i32; 2], columns: u32, rows: u32) {
+        let Some(visits) = &mut self.visits else { return };
+        for i in 0..4 {
+            let corner = (bx[i & 1] * 4, by[i >> 1] * 4);
+            let pixels = sixteen(columns >> (4 * (i & 1)), rows >> (4 * (i >> 1)));
+            add_visits(&mut visits.cubes, self.width, self.height, corner, 1, pixels);
+        }
     }
 
     /// What the children of the at most 2×2 parents at `level` that a rectangle meets say of it at a depth.

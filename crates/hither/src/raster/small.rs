@@ -3,7 +3,7 @@
 
 use super::fill::{Filled, blocks_of};
 use super::paint::{COLUMN, How, Paint, ROW, fill_block};
-use super::pyramid::{Rect, Target};
+use super::pyramid::{Rect, Target, cell_mask};
 use super::setup::ScreenTriangle;
 use fearless_simd::{Simd, i32x16, prelude::*};
 
@@ -33,27 +33,18 @@ pub(super) fn fill_tiny<S: Simd>(
     // Unclipped: the bounds may begin beyond the window.
     let first = |v: &[i32; 3]| (v[0].min(v[1]).min(v[2]) + 127) >> 8;
     let (x, y) = (first(&t.x) - target.left, first(&t.y) - target.top);
-    let (right, bottom) = (x & 3 == 3, y & 3 == 3);
-    let [a, b, c, d] = covers;
-    let at = (x & 3) + (y & 3) * 4;
-    // Most lie in one block; else in two or four.
-    let pieces = match (right, bottom) {
-        (false, false) => [(x, y, (a | b << 1 | c << 4 | d << 5) << at), NONE, NONE, NONE],
-        (true, false) => {
-            let row = (y & 3) * 4;
-            [(x, y, (a | c << 4) << at), (x + 1, y, (b | d << 4) << row), NONE, NONE]
-        }
-        (false, true) => [(x, y, (a | b << 1) << at), (x, y + 1, (c | d << 1) << (x & 3)), NONE, NONE],
-        (true, true) => [(x, y, a << 15), (x + 1, y, b << 12), (x, y + 1, c << 3), (x + 1, y + 1, d)],
-    };
+    let mut pieces = pieces_in_blocks(x, y, covers);
+    if x < 0 || y < 0 || x + 1 >= target.width || y + 1 >= target.height {
+        pieces = inside(pieces, x, y, target);
+    }
     let mut paint = Paint::new(simd, target, t, how);
     let mut rasterised = false;
-    for (x, y, covered) in pieces {
-        let inside = x >= 0 && y >= 0 && x < target.width && y < target.height;
-        if covered == 0 || !inside {
-            continue;
-        }
-        let (bx, by) = (x >> 2, y >> 2);
+    // Most lie in one block.
+    let mut rest = (0..4).fold(0u32, |bits, i| bits | u32::from(pieces[i] != 0) << i);
+    while rest != 0 {
+        let i = rest.trailing_zeros() as i32 & 3;
+        rest &= rest - 1;
+        let (bx, by) = ((x + (i & 1)) >> 2, (y + (i >> 1)) >> 2);
         let tile = (by >> 2) as usize * target.tiles_x + (bx >> 2) as usize;
         let block = ((by & 3) * 4 + (bx & 3)) as usize;
         if how.hierarchical && t.depth_max < target.block_minima(tile)[block] {
@@ -62,6 +53,7 @@ pub(super) fn fill_tiny<S: Simd>(
         rasterised = true;
         target.touch(tile);
         let origin = paint.plane_at(target, bx * 4, by * 4);
+        let covered = pieces[i as usize];
         if fill_block(simd, target, &mut paint, tile, block, (bx * 4, by * 4), origin, covered, is_hole) {
             target.mark_stale(tile);
         }
@@ -72,8 +64,41 @@ pub(super) fn fill_tiny<S: Simd>(
     Filled { rasterised, wrote: paint.wrote }
 }
 
-/// No part of a tiny triangle.
-pub(super) const NONE: (i32, i32, u32) = (0, 0, 0);
+/// 2×2 pixels from window pixel (x, y) on as bits of the blocks they lie in: piece `i` is of the block of pixel
+/// `i` (bit 0 right, bit 1 below), and where two share a block, the first speaks for both.
+#[inline(always)]
+fn pieces_in_blocks(x: i32, y: i32, covers: [u32; 4]) -> [u32; 4] {
+    let (column, row) = ([x & 3, (x + 1) & 3], [(y & 3) * 4, ((y + 1) & 3) * 4]);
+    let [mut a, mut b, mut c, mut d] = covers;
+    (a, b) = (a << (column[0] + row[0]), b << (column[1] + row[0]));
+    (c, d) = (c << (column[0] + row[1]), d << (column[1] + row[1]));
+    // All ones where the neighbour lies in a block of its own. Without a branch: it cannot be foreseen.
+    let own = |v: i32| ((v & 3 != 3) as u32).wrapping_sub(1);
+    let (right, below) = (own(x), own(y));
+    (a, b) = (a | b & !right, b & right);
+    (c, d) = (c | d & !right, d & right);
+    (a, c) = (a | c & !below, c & below);
+    (b, d) = (b | d & !below, d & below);
+    [a, b, c, d]
+}
+
+/// Of the pieces of 2×2 pixels from window pixel (x, y) on, what lies in the window. Its border runs between
+/// tiles, or along the image's, so that pixels that share a block may lie on either side of it.
+#[inline(never)]
+fn inside(pieces: [u32; 4], x: i32, y: i32, target: &Target) -> [u32; 4] {
+    let mut kept = [0; 4];
+    for (i, piece) in (0i32..).zip(pieces) {
+        let (bx, by) = (((x + (i & 1)) >> 2) * 4, ((y + (i >> 1)) >> 2) * 4);
+        let pixels = cell_mask(
+            (-bx).clamp(0, 4),
+            (-by).clamp(0, 4),
+            (target.width - 1 - bx).clamp(-1, 3),
+            (target.height - 1 - by).clamp(-1, 3),
+        );
+        kept[i as usize] = piece & pixels;
+    }
+    kept
+}
 
 /// Fills a triangle that [`is_small`].
 #[inline(always)]
@@ -159,4 +184,39 @@ pub(super) fn open_corners(target: &mut Target, blocks: &Rect, depth: f32, hiera
         }
     }
     open
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The window pixels that pieces stand for, whichever way they are put together.
+    fn pixels(pieces: [u32; 4], x: i32, y: i32) -> Vec<(i32, i32)> {
+        let mut pixels = Vec::new();
+        for (i, piece) in (0i32..).zip(pieces) {
+            let (bx, by) = ((x + (i & 1)) >> 2, (y + (i >> 1)) >> 2);
+            let covered = (0..16).filter(|p| piece >> p & 1 == 1);
+            pixels.extend(covered.map(|p| (bx * 4 + p % 4, by * 4 + p / 4)));
+        }
+        pixels.sort_unstable();
+        pixels
+    }
+
+    #[test]
+    fn tiny_triangles_keep_their_pixels_wherever_blocks_and_windows_end() {
+        let target = Target::new(16, 0, 21, 18);
+        for (x, y) in (-1..21).flat_map(|x| (-1..18).map(move |y| (x, y))) {
+            for bits in 0..16u32 {
+                let covers = [0, 1, 2, 3].map(|i| bits >> i & 1);
+                let own = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
+                let mut expected: Vec<_> = (0..4).filter(|&i| covers[i] == 1).map(|i| own[i]).collect();
+                expected.sort_unstable();
+                let pieces = pieces_in_blocks(x, y, covers);
+                assert_eq!(pixels(pieces, x, y), expected, "({x}, {y}), {bits:04b}");
+                expected.retain(|p| p.0 >= 0 && p.1 >= 0 && p.0 < 21 && p.1 < 18);
+                let kept = inside(pieces, x, y, &target);
+                assert_eq!(pixels(kept, x, y), expected, "({x}, {y}), {bits:04b}, in the window");
+            }
+        }
+    }
 }

@@ -18,6 +18,8 @@ use crate::conventions::{View, ViewError};
 use crate::index::SceneIndex;
 use crate::raster::{TILE, Target};
 use fearless_simd::Level;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::sync::Mutex;
 
 /// How visibility is found. The pictures are the same to the last bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -73,10 +75,12 @@ impl Default for RenderOptions {
     }
 }
 
-/// Draws frames and keeps what is worth keeping between them: buffers, and what was visible last.
+/// Draws frames and keeps what is worth keeping between them: buffers, workers, and what was visible last.
 #[derive(Debug, Default)]
 pub struct Renderer {
     spare: Vec<Target>,
+    /// All but the thread that asks for a frame: starting them takes as long as drawing a small one.
+    workers: Option<ThreadPool>,
     memories: Vec<walk::Memory>,
     /// Which index and which windows `memories` speak of.
     remembered: (u64, Vec<u32>),
@@ -105,6 +109,7 @@ impl Renderer {
         for window in &mut windows {
             window.record_visits(options.complexity);
         }
+        self.prepare_workers(threads);
         let draw = |(window, memory): Work| {
             walk::draw_window(
                 options.level,
@@ -119,12 +124,13 @@ impl Renderer {
         self.prepare_memories(if plain { Coherence::Never } else { options.coherence }, index, &columns);
         let memories = self.memories.iter_mut().map(Some).chain(std::iter::repeat_with(|| None));
         let work = windows.iter_mut().zip(memories);
-        let counts: Vec<Counters> =
-            if threads == 1 { work.map(draw).collect() } else { in_parallel(threads, work, draw) };
-        let mut counters = Counters::default();
-        for c in counts {
-            counters += c;
-        }
+        let counters = match &self.workers {
+            Some(workers) => in_parallel(workers, work, draw),
+            None => work.map(draw).fold(Counters::default(), |mut sum, c| {
+                sum += c;
+                sum
+            }),
+        };
         let mut frame = Frame { view: *view, counters, complexity: None, windows, columns };
         if options.complexity {
             frame.gather_complexity();
@@ -135,6 +141,16 @@ impl Renderer {
     /// Takes a frame's buffers back for the next one.
     pub fn recycle(&mut self, frame: Frame) {
         self.spare = frame.windows;
+    }
+
+    /// As many workers as `threads` needs beside the one that asks; none where the system gives none.
+    fn prepare_workers(&mut self, threads: usize) {
+        if self.workers.as_ref().map_or(1, |w| w.current_num_threads() + 1) != threads {
+            self.workers = match threads {
+                1 => None,
+                n => ThreadPoolBuilder::new().num_threads(n - 1).build().ok(),
+            };
+        }
     }
 
     /// One memory a window if the frame may be coherent, none otherwise.
@@ -197,29 +213,26 @@ const WINDOWS_A_THREAD: u32 = 2;
 /// A window to be drawn, and what it showed last time.
 type Work<'a> = (&'a mut Target, Option<&'a mut walk::Memory>);
 
-/// Workers take the next window until none is left.
+/// All workers, and this thread with them, take the next window until none is left.
 fn in_parallel<'a>(
-    threads: usize,
+    workers: &ThreadPool,
     work: impl Iterator<Item = Work<'a>> + Send,
     draw: impl Fn(Work) -> Counters + Sync,
-) -> Vec<Counters> {
-    let queue = std::sync::Mutex::new(work);
+) -> Counters {
+    let queue = Mutex::new(work);
+    let sum = Mutex::new(Counters::default());
+    let take = || queue.lock().expect("no worker panics while it holds the lock").next();
     let work = || {
-        let mut total = Counters::default();
-        loop {
-            let next = queue.lock().expect("no worker panics while it holds the lock").next();
-            match next {
-                Some(window) => total += draw(window),
-                None => return total,
-            }
+        while let Some(window) = take() {
+            let counters = draw(window);
+            *sum.lock().expect("adding does not panic") += counters;
         }
     };
-    std::thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
-        let mut counts = vec![work()];
-        for other in others {
-            counts.push(other.join().expect("a window was not drawn"));
+    workers.in_place_scope(|scope| {
+        for _ in 0..workers.current_num_threads() {
+            scope.spawn(|_| work());
         }
-        counts
-    })
+        work();
+    });
+    sum.into_inner().expect("adding does not panic")
 }

@@ -4,6 +4,8 @@
 //! pushed while a walk goes on is never nearer than what it came from, so the front only moves away and
 //! finding the next bucket costs one pass over the buckets a frame. Depth order across the whole scene,
 //! not only within one tree, is what lets long, nested boxes be taken piece by piece.
+//!
+//! A queue that has run empty may start anew at any depth.
 
 /// A queue of values with depths (larger is nearer).
 #[derive(Debug)]

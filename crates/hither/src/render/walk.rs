@@ -8,6 +8,7 @@
 //!     a block of triangles: draw it
 //!     an instance: enter its tree, with its transform composed in f64
 //!     a node: project its sixteen boxes; open those that may hold a pixel centre
+//! what lies in an entry of few pixels comes before anything else, nearest first
 //! ```
 //!
 //! The order only saves work: whatever it is, the window ends up the same (see `raster`). Entries are
@@ -107,7 +108,13 @@ struct Walk<'a> {
     mesh_bounds: Vec<Option<Box3>>,
     group_bounds: Vec<Option<Box3>>,
     open: NearestFirst<Entry>,
+    /// What lies in the small entry being gone through, which comes before anything in `open`.
+    near: NearestFirst<Entry>,
+    /// While one is gone through: the number of contexts before it.
+    kept: Option<usize>,
     window: Rect,
+    /// The children of the node visited last.
+    projected: ProjectedBoxes,
     hierarchical: bool,
     definitive: bool,
     /// Blocks drawn from memory before the walk.
@@ -138,7 +145,10 @@ fn walk<S: Simd>(
         mesh_bounds: vec![None; index.meshes.len()],
         group_bounds: vec![None; index.groups.len()],
         open: NearestFirst::new(),
+        near: NearestFirst::new(),
+        kept: None,
         window,
+        projected: ProjectedBoxes::default(),
         hierarchical: how.0 == Algorithm::Hzb,
         definitive: how == (Algorithm::Hzb, BoxTest::Definitive),
         drawn: HashSet::default(),
@@ -153,7 +163,7 @@ fn walk<S: Simd>(
         walk.seen = memory.keeps_next().then(|| Vec::with_capacity(memory.seen.len() + 64));
     }
     walk.enter(simd, target, Content::Group(root), ScreenFromObject::of_view(view), 0);
-    while let Some(entry) = walk.open.pop() {
+    while let Some(entry) = walk.next() {
         if walk.hierarchical && target.hides(simd, rect_of(&entry), entry.depth) {
             walk.counters.nodes_culled += 1;
             continue;
@@ -162,6 +172,7 @@ fn walk<S: Simd>(
             walk.counters.nodes_culled += 1;
             continue;
         }
+        walk.go_through_if_small(&entry);
         match entry.slot.child() {
             Child::Node(node) => {
                 walk.visit_node(simd, target, entry.context, Place::new(entry.place.is_moving(), node));
@@ -179,6 +190,9 @@ fn walk<S: Simd>(
 
 /// Rectangles with a side below this, pixels, are left at the test of the rectangle.
 const DEFINITIVE: u16 = 16;
+
+/// Entries with both sides below this, pixels (up to one), are gone through at once.
+const SMALL: u16 = 16;
 
 #[inline(always)]
 fn tree_of<'a>(context: &Context<'a>, moving: bool) -> &'a WideTree {
@@ -201,6 +215,28 @@ fn rect_of(entry: &Entry) -> Rect {
 }
 
 impl<'a> Walk<'a> {
+    /// Takes what is to be visited next.
+    #[inline(always)]
+    fn next(&mut self) -> Option<Entry> {
+        if let Some(entry) = self.near.pop() {
+            return Some(entry);
+        }
+        if let Some(kept) = self.kept.take() {
+            self.contexts.truncate(kept);
+        }
+        self.open.pop()
+    }
+
+    /// What lies in an entry of few pixels is gone through at once, nearest first, before anything else: its
+    /// transforms and pixels then stay in the nearest cache, and are done with when it is.
+    #[inline(always)]
+    fn go_through_if_small(&mut self, entry: &Entry) {
+        let r = &entry.rect;
+        if self.kept.is_none() && (r[2] - r[0]).max(r[3] - r[1]) < SMALL {
+            self.kept = Some(self.contexts.len());
+        }
+    }
+
     /// Opens the tree of `content` (seen through `at`) and visits its root.
     #[inline(always)]
     fn enter<S: Simd>(
@@ -261,31 +297,30 @@ impl<'a> Walk<'a> {
     fn visit_node<S: Simd>(&mut self, simd: S, target: &Target, context: u32, place: Place) {
         let c = &self.contexts[context as usize];
         let node = &tree_of(c, place.is_moving()).nodes[place.node()];
-        let window = self.window;
-        let boxes = &c.boxes;
-        let projected = simd.vectorize(
+        let (window, boxes, projected) = (self.window, &c.boxes, &mut self.projected);
+        simd.vectorize(
             #[inline(always)]
-            || project_boxes(simd, boxes, &node.min, &node.max, window),
+            || project_boxes(simd, boxes, &node.min, &node.max, window, projected),
         );
         let alive = projected.alive & (0xFFFFu32 >> (16 - node.used)) as u16;
         self.counters.nodes_visited += u64::from(node.used);
         self.counters.nodes_outside += u64::from(node.used - alive.count_ones());
-        self.push_children(target, &projected, alive, (place, &node.child), context);
+        self.push_children(target, alive, (place, &node.child), context);
     }
 
-    /// Opens the children in `alive`.
+    /// Opens the children in `alive` of the node projected last.
     #[inline(always)]
     fn push_children(
         &mut self,
         target: &Target,
-        projected: &ProjectedBoxes,
         alive: u16,
         (place, child): (Place, &[Slot; 16]),
         context: u32,
     ) {
+        let projected = &self.projected;
         let mut rest = alive;
         while rest != 0 {
-            let lane = rest.trailing_zeros() as usize;
+            let lane = rest.trailing_zeros() as usize & 15;
             rest &= rest - 1;
             if child[lane] == Slot::EMPTY {
                 continue;
@@ -306,7 +341,8 @@ impl<'a> Walk<'a> {
                 self.counters.nodes_culled += 1;
                 continue;
             }
-            self.open.push(entry, entry.depth.max(0.0));
+            let queue = if self.kept.is_some() { &mut self.near } else { &mut self.open };
+            queue.push(entry, entry.depth.max(0.0));
         }
     }
 

@@ -85,7 +85,7 @@ pub(crate) fn project<S: Simd>(
     min: &[[f32; 16]; 3],
     max: &[[f32; 16]; 3],
 ) -> BoxesOnScreen {
-    let (lo, hi) = (axes(simd, min), axes(simd, max));
+    let (lo, hi) = (axes(simd, min, 0), axes(simd, max, 0));
     let reach = reach(&lo, &hi);
     let (x_error, y_error) = (error(&reach, &view.x), error(&reach, &view.y));
     let (mut low, mut high) = ([f32x16::splat(simd, 0.0); 2], [f32x16::splat(simd, 0.0); 2]);

@@ -4,7 +4,7 @@ use super::{Boxes, Occluder, Verdict};
 use crate::conventions::{SurfaceId, View, ViewError};
 use crate::geometry::Aabb;
 use crate::raster::{
-    BoxSet, Drawing, Rect, ScreenFromObject, Target, TriangleBlock, draw_block, project_boxes,
+    BoxSet, Drawing, ProjectedBoxes, Rect, ScreenFromObject, Target, TriangleBlock, draw_block, project_boxes,
 };
 use fearless_simd::{Level, Simd, dispatch};
 use glam::DAffine3;
@@ -105,10 +105,12 @@ impl SampledBuffer {
 #[inline(always)]
 fn ask<S: Simd>(simd: S, target: &mut Target, set: &BoxSet, boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
     let window = target.bounds();
+    let mut at = ProjectedBoxes::default();
     for sixteen in &boxes.sixteen {
-        let at = simd.vectorize(
+        let boxes = &mut at;
+        simd.vectorize(
             #[inline(always)]
-            || project_boxes(simd, set, &sixteen.min, &sixteen.max, window),
+            || project_boxes(simd, set, &sixteen.min, &sixteen.max, window, boxes),
         );
         for lane in 0..16 {
             let rect = Rect {
