@@ -26,3 +26,9 @@ dot -Tsvg "$work/ring.dot" -o docs/pictures/ring.svg
 hither layers 'world:toothpicks?n=60' -o "$work/layers" --size 320x180 --samples 3 \
   --focus 4.4 --f-number 1 --focal-length 300 --lens-samples 21
 cp "$work"/layers/focus{,-single,-truth}.png docs/pictures/
+
+# Layers side by side, front to back, and the composite: needs ImageMagick.
+hither layers 'world:toothpicks?n=7' -o "$work/apart" --size 360x270 --samples 3 \
+  --eye 1.4,1.5,3.6 --target 0,-0.1,0 --fov 42 --leave-out-empty
+montage "$work"/apart/[0-9]*.png "$work/apart/composite.png" -background "rgb($sky)" -bordercolor "rgb($sky)" -border 1 \
+  -geometry 96x72+1+1 -background white -tile 10x -depth 8 -strip docs/pictures/apart.png

@@ -191,11 +191,88 @@ fn a_node_is_split_into_parts() {
     ]);
     let off = json["frames"][0]["verification"]["largest_difference"].as_f64().unwrap();
     assert!(off < 1.0 / 255.0, "{off}");
-    for (split, code) in
-        [("terrain 0=grid:5", 2), ("terrain 0", 2), ("terrain 0=grid:0x1", 2), ("sea=grid:2x2", 1)]
-    {
+    // Part 1 is the terrain.
+    assert_eq!(parts(&["--split", "1=grid:5x5", "--backdrop", "0"]), 37 + 25);
+    for (split, code) in [
+        ("terrain 0=grid:5", 2),
+        ("38=grid:2x2", 1),
+        ("terrain 0", 2),
+        ("terrain 0=grid:0x1", 2),
+        ("sea=grid:2x2", 1),
+    ] {
         let refused = hither(&["order", VALLEY, "--split", split]);
         assert_eq!(refused.status.code(), Some(code), "{split}");
     }
     assert_eq!(hither(&["order", VALLEY, "--overlap", "5"]).status.code(), Some(2));
+}
+
+/// Panes one behind the other, tilted, all but the last transparent; a transparent box among them; and, if they are
+/// to cross, two more that pass through each other.
+fn panes(folder: &Folder, crossing: bool) -> String {
+    let mut text = String::from("mtllib glass.mtl\n");
+    let mut vertices = 0;
+    let mut quads = |name: &str, material: &str, corners: &[[f64; 3]], faces: &[[usize; 4]]| {
+        text.push_str(&format!("o {name}\nusemtl {material}\n"));
+        corners.iter().for_each(|[x, y, z]| text.push_str(&format!("v {x} {y} {z}\n")));
+        for [a, b, c, d] in faces {
+            let [a, b, c, d] = [a, b, c, d].map(|i| vertices + i + 1);
+            text.push_str(&format!("f {a} {b} {c} {d}\n"));
+        }
+        vertices += corners.len();
+    };
+    for i in 0..5u32 {
+        let (z, x) = (-f64::from(i), 0.25 * f64::from(i));
+        let material = ["red", "green", "blue", "red", "solid"][i as usize];
+        let corners =
+            [[x - 1.0, -1.0, z], [x + 1.0, -1.0, z - 0.4], [x + 1.0, 1.0, z - 0.4], [x - 1.0, 1.0, z]];
+        quads(&format!("pane{i}"), material, &corners, &[[0, 1, 2, 3]]);
+    }
+    let corner = |i: u32| {
+        let side = |bit: u32, half: f64| if i >> bit & 1 == 0 { -half } else { half };
+        [0.6 + side(0, 0.5), 0.4 + side(1, 0.5), -1.7 + side(2, 0.1)]
+    };
+    let box_ = [[0, 1, 3, 2], [5, 4, 6, 7], [4, 0, 2, 6], [1, 5, 7, 3], [2, 3, 7, 6], [4, 5, 1, 0]];
+    quads("box", "green", &(0..8).map(corner).collect::<Vec<_>>(), &box_);
+    if crossing {
+        for (name, tilt) in [("left", 0.5), ("right", -0.5)] {
+            let corners = [[-2.5, -1.0, -2.0 - tilt], [-1.5, -1.0, -2.0 + tilt], [-1.5, 1.0, -2.0 + tilt]];
+            let last = [-2.5, 1.0, -2.0 - tilt];
+            quads(name, "blue", &[corners[0], corners[1], corners[2], last], &[[0, 1, 2, 3]]);
+        }
+    }
+    let colors = [("red", "0.9 0.1 0.1", 0.4), ("green", "0.1 0.8 0.2", 0.5), ("blue", "0.1 0.2 0.9", 0.6)];
+    let mut materials = String::from("newmtl solid\nKd 0.8 0.8 0.7\n");
+    for (name, color, alpha) in colors {
+        materials.push_str(&format!("newmtl {name}\nKd {color}\nd {alpha}\n"));
+    }
+    fs::write(folder.path("glass.mtl"), materials).unwrap();
+    let path = folder.path("panes.obj");
+    fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn transparent_scenes_are_those_sorted_at_every_pixel_and_cycles_are_named() {
+    let folder = Folder::new("transparent");
+    for crossing in [false, true] {
+        let scene = panes(&folder, crossing);
+        let picture = |algorithm: &str| {
+            let file = folder.path(&format!("{algorithm}.png"));
+            let view = ["--eye", "-0.4,0.3,4", "--target", "0,0,-2", "--size", "240x160", "-v"];
+            let arguments = ["render", &scene, "--algorithm", algorithm, "-o", &file];
+            let output = hither(&[&arguments[..], &view[..]].concat());
+            assert!(output.status.success());
+            let (_, _, pixels) = hither_io::read_picture(file.as_ref()).unwrap();
+            (fs::read(&file).unwrap(), pixels, String::from_utf8(output.stderr).unwrap())
+        };
+        let ((truth, pixels, _), (layered, _, said)) = (picture("hzb"), picture("layers"));
+        assert!(truth == layered, "crossing: {crossing}");
+        let partly = pixels.iter().filter(|p| p[3] > 0.3 && p[3] < 0.95).count();
+        assert!(partly > 2_000, "{partly} pixels are transparent");
+        let named = said.lines().filter(|l| l.contains("in a binary cycle, drawn together:"));
+        let named: Vec<&str> = named.map(|l| l.rsplit(": ").next().unwrap()).collect();
+        assert_eq!(named.len(), usize::from(crossing), "{said}");
+        assert!(!crossing || (named[0].contains("left") && named[0].contains("right")), "{said}");
+        assert_eq!(said.contains("2 parts occlude each other both ways"), crossing, "{said}");
+    }
 }

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::atomic::write_whole;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, ImageAttributes, Layer,
-    LayerAttributes, SmallVec, Text, Vec2, WritableImage, f16,
+    LayerAttributes, SmallVec, SpecificChannels, Text, Vec2, WritableImage, f16,
 };
 use hither::conventions::SurfaceId;
 use std::io::{self, Cursor};
@@ -94,8 +94,12 @@ pub struct LayerPicture<'a> {
     pub visible: bool,
 }
 
-/// Writes layers, front to back, as the parts of one EXR file, whole or not at all; `notes` become text attributes
-/// of the file. Parts are named `NNN name`, for EXR wants names to differ.
+/// Writes a picture and its layers, front to back, as the parts of one EXR file, whole or not at all; `notes` become text
+/// attributes of the file. Parts are named `NNN name`, for EXR wants names to differ.
+///
+/// The picture is the first of `layers`: its channels are `R`, `G`, `B`, `A`, for programs that know no layers. Those of
+/// a layer are `NNN name.Combined.R` and so on, and every part has a value for every pixel: Blender tells layers by
+/// these names alone, and takes all parts to be where the first is.
 pub fn write_exr_layers(
     path: &Path,
     (width, height): (u32, u32),
@@ -115,23 +119,32 @@ fn encode_layers(
     layers: &[LayerPicture],
     notes: &[(&str, &str)],
 ) -> io::Result<Vec<u8>> {
-    let part = |(number, layer): (usize, &LayerPicture)| {
-        // A part cannot be empty.
-        let empty = layer.pixels.is_empty();
-        let size = if empty { (1, 1) } else { (layer.size.0 as usize, layer.size.1 as usize) };
-        let pixels = if empty { &[[0.0; 4]][..] } else { layer.pixels };
-        let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
-        for (name, at) in [("R", 0), ("G", 1), ("B", 2), ("A", 3)] {
-            channels.push(channel(name, FlatSamples::F32(pixels.iter().map(|p| p[at]).collect())));
-        }
+    let size = (width as usize, height as usize);
+    let parts = layers.iter().copied().enumerate().map(|(number, layer)| {
         let name = format!("{number:03} {}", layer.name);
+        let channel = |channel: &str| match number {
+            0 => Text::from(channel),
+            _ => text(&format!("{name}.Combined.{channel}")),
+        };
+        let pixel = move |at: Vec2<usize>| {
+            let inside = |at: usize, from: u32, size: u32| {
+                at.checked_sub(from as usize).filter(|&i| i < size as usize)
+            };
+            let column = inside(at.x(), layer.position.0, layer.size.0);
+            let row = inside(at.y(), layer.position.1, layer.size.1);
+            let place = row.zip(column).map(|(row, column)| row * layer.size.0 as usize + column);
+            let [r, g, b, a] = place.map_or([0.0; 4], |place| layer.pixels[place]);
+            (r, g, b, a)
+        };
+        let channels = SpecificChannels::build();
+        let channels = channels.with_channel(channel("R")).with_channel(channel("G"));
+        let channels = channels.with_channel(channel("B")).with_channel(channel("A")).with_pixel_fn(pixel);
         let mut attributes = LayerAttributes::named(text(&name));
-        attributes.layer_position = Vec2(layer.position.0 as i32, layer.position.1 as i32);
         attributes.software_name = Some(Text::from(concat!("hither ", env!("CARGO_PKG_VERSION"))));
-        Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels))
-    };
-    let parts: Vec<_> = layers.iter().enumerate().map(part).collect();
-    let mut attributes = ImageAttributes::with_size((width as usize, height as usize));
+        Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, channels)
+    });
+    let parts: Vec<_> = parts.collect();
+    let mut attributes = ImageAttributes::with_size(size);
     for (name, value) in notes {
         attributes.other.insert(text(name), AttributeValue::Text(text(value)));
     }
@@ -200,5 +213,35 @@ mod tests {
             assert_eq!(channel("instance"), FlatSamples::U32(surfaces.iter().map(|s| s.instance).collect()));
             assert_eq!(channel("triangle"), FlatSamples::U32(surfaces.iter().map(|s| s.triangle).collect()));
         }
+    }
+
+    #[test]
+    fn layers_have_names_of_their_own_and_a_value_for_every_pixel() {
+        let whole: Vec<[f32; 4]> = (0..30).map(|i| [i as f32, 0.5, 0.25, 1.0]).collect();
+        let picture =
+            LayerPicture { name: "composite", position: (0, 0), size: (6, 5), pixels: &whole, visible: true };
+        let cut =
+            LayerPicture { name: "wall.001", position: (2, 1), size: (3, 2), pixels: &whole[..6], ..picture };
+        let empty = LayerPicture { name: "b", position: (0, 0), size: (0, 0), pixels: &[], ..picture };
+        let encoded = encode_layers((6, 5), &[picture, cut, empty], &[("expression", "a over b")]).unwrap();
+        let back = read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            .from_buffered(Cursor::new(encoded))
+            .unwrap();
+        let values = |layer: usize, name: &str| -> Vec<f32> {
+            let layer = &back.layer_data[layer];
+            assert_eq!((layer.size, layer.attributes.layer_position), (Vec2(6, 5), Vec2(0, 0)));
+            let found = layer.channel_data.list.iter().find(|c| c.name.eq(name));
+            found.unwrap().sample_data.values_as_f32().collect()
+        };
+        assert_eq!(values(0, "R"), (0..30).map(|i| i as f32).collect::<Vec<_>>());
+        let red = values(1, "001 wall.001.Combined.R");
+        assert_eq!((red[8], red[9], red[16], red.iter().sum::<f32>()), (0.0, 1.0, 5.0, 15.0));
+        assert_eq!(values(1, "001 wall.001.Combined.A").iter().sum::<f32>(), 6.0);
+        assert_eq!(values(2, "002 b.Combined.A"), [0.0; 30]);
     }
 }

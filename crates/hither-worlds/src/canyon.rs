@@ -36,6 +36,13 @@ pub(crate) const INFO: WorldInfo = WorldInfo {
             default: KeyDefault::Number(20),
         },
         KeyInfo {
+            name: "speed",
+            description: "velocities are multiplied by this",
+            min: 0,
+            max: 64,
+            default: KeyDefault::Fraction(1.0),
+        },
+        KeyInfo {
             name: "frames",
             description: "length, sixtieths of a second",
             min: 1,
@@ -82,15 +89,16 @@ fn canyon(values: &Values) -> Scene {
         );
     }
     let duration = values.get("frames") as f64 / FRAMES_A_SECOND;
+    let clock = Clock { duration, pace: values.fraction("speed") };
     let mut motion = Animation { name: "flyby".to_owned(), channels: Vec::new() };
     let parts = aircraft();
     let first = scene.meshes.len() as u32;
     scene.meshes.extend(parts.iter().map(|p| p.mesh.clone()));
     for i in 0..6 {
         let node = plane(&mut scene, i, &parts, first);
-        motion.channels.extend(flight(node, i, duration));
+        motion.channels.extend(flight(node, i, &clock));
     }
-    camera(&mut scene, &mut motion, duration);
+    camera(&mut scene, &mut motion, &clock);
     scene.animations = vec![motion];
     scene
 }
@@ -277,10 +285,25 @@ fn turn(axis: DVec3, angle: f64) -> DQuat {
     DQuat::from_xyzw(axis.x * s, axis.y * s, axis.z * s, c)
 }
 
-fn flight(node: u32, i: u32, duration: f64) -> [Channel; 2] {
-    let keys = (duration * 10.0).ceil().max(1.0) as u32;
-    let times: Vec<f32> = (0..=keys).map(|k| (duration * f64::from(k) / f64::from(keys)) as f32).collect();
-    let at = |t: &f32| f64::from(*t);
+/// When there are keys, and where the flight is then.
+struct Clock {
+    /// Seconds.
+    duration: f64,
+    /// Seconds of flight a second.
+    pace: f64,
+}
+
+impl Clock {
+    /// A tenth of a second of flight apart, at most.
+    fn times(&self) -> Vec<f32> {
+        let keys = (self.duration * 10.0 * self.pace.max(1.0)).ceil().max(1.0) as u32;
+        (0..=keys).map(|k| (self.duration * f64::from(k) / f64::from(keys)) as f32).collect()
+    }
+}
+
+fn flight(node: u32, i: u32, clock: &Clock) -> [Channel; 2] {
+    let times = clock.times();
+    let at = |t: &f32| f64::from(*t) * clock.pace;
     let places = times.iter().map(|t| position(i, at(t)).as_vec3().extend(0.0)).collect();
     let turns = times.iter().map(|t| Vec4::from(heading(i, at(t)).as_quat())).collect();
     let channel = |property, values| Channel {
@@ -294,7 +317,7 @@ fn flight(node: u32, i: u32, duration: f64) -> [Channel; 2] {
 }
 
 /// Follows the formation from above and behind.
-fn camera(scene: &mut Scene, motion: &mut Animation, duration: f64) {
+fn camera(scene: &mut Scene, motion: &mut Animation, clock: &Clock) {
     let eye = |t: f64| {
         let z = position(0, t).z + 62.0;
         DVec3::new(middle(z), 56.0, z)
@@ -310,10 +333,10 @@ fn camera(scene: &mut Scene, motion: &mut Animation, duration: f64) {
         local: Transform::Trs { translation: eye(0.0), rotation: look(0.0), scale: DVec3::ONE },
         ..Node::default()
     });
-    let keys = (duration * 10.0).ceil().max(1.0) as u32;
-    let times: Vec<f32> = (0..=keys).map(|k| (duration * f64::from(k) / f64::from(keys)) as f32).collect();
-    let places = times.iter().map(|&t| eye(f64::from(t)).as_vec3().extend(0.0)).collect();
-    let turns = times.iter().map(|&t| Vec4::from(look(f64::from(t)).as_quat())).collect();
+    let times = clock.times();
+    let at = |t: &f32| f64::from(*t) * clock.pace;
+    let places = times.iter().map(|t| eye(at(t)).as_vec3().extend(0.0)).collect();
+    let turns = times.iter().map(|t| Vec4::from(look(at(t)).as_quat())).collect();
     let channel = |property, values| Channel {
         node,
         property,

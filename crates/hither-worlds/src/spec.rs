@@ -17,8 +17,8 @@ pub struct WorldInfo {
     pub(crate) make: fn(&Values) -> Scene,
 }
 
-/// A key that a spec may set to a whole number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A key that a spec may set to a number; a whole one unless its default is a [`KeyDefault::Fraction`].
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeyInfo {
     /// The key's name.
     pub name: &'static str,
@@ -33,10 +33,12 @@ pub struct KeyInfo {
 }
 
 /// What a key is where a spec leaves it out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum KeyDefault {
     /// This number.
     Number(u64),
+    /// This number, and the key takes fractions.
+    Fraction(f64),
     /// The value of an earlier key.
     SameAs(&'static str),
 }
@@ -62,8 +64,8 @@ pub enum WorldError {
         /// The keys there are, with ranges and defaults.
         known: String,
     },
-    /// The value is no whole number, out of range, missing or given twice.
-    #[error("world {world}: {key}={value} {fault}; {key} is a whole number from {min} to {max}")]
+    /// The value is no such number, out of range, missing or given twice.
+    #[error("world {world}: {key}={value} {fault}; {key} is {kind} from {min} to {max}")]
     BadValue {
         /// The world.
         world: &'static str,
@@ -73,6 +75,8 @@ pub enum WorldError {
         value: String,
         /// What is wrong with it.
         fault: &'static str,
+        /// What it should be.
+        kind: &'static str,
         /// Smallest value.
         min: u64,
         /// Largest value.
@@ -80,11 +84,31 @@ pub enum WorldError {
     },
 }
 
+impl KeyInfo {
+    fn takes_fractions(&self) -> bool {
+        matches!(self.default, KeyDefault::Fraction(_))
+    }
+
+    /// What may be written for it.
+    fn kind(&self) -> &'static str {
+        if self.takes_fractions() { "a number" } else { "a whole number" }
+    }
+
+    fn read(&self, text: &str) -> Option<f64> {
+        match self.takes_fractions() {
+            true => text.parse().ok().filter(|number: &f64| !number.is_nan()),
+            false => text.parse().ok().map(|number: u64| number as f64),
+        }
+    }
+}
+
 impl fmt::Display for KeyInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} ({} to {}, default ", self.name, self.min, self.max)?;
+        let any = if self.takes_fractions() { "any number from " } else { "" };
+        write!(f, "{} ({any}{} to {}, default ", self.name, self.min, self.max)?;
         match self.default {
             KeyDefault::Number(n) => write!(f, "{n})"),
+            KeyDefault::Fraction(number) => write!(f, "{number})"),
             KeyDefault::SameAs(other) => write!(f, "as {other})"),
         }
     }
@@ -105,12 +129,12 @@ pub(crate) fn unknown_world(name: &str, known: impl Iterator<Item = &'static str
 /// A world's keys with their values, those left out filled in.
 pub(crate) struct Values {
     keys: &'static [KeyInfo],
-    values: Vec<u64>,
+    values: Vec<f64>,
 }
 
 impl Values {
     pub(crate) fn parse(world: &WorldInfo, query: &str) -> Result<Values, WorldError> {
-        let mut given: Vec<Option<u64>> = vec![None; world.keys.len()];
+        let mut given: Vec<Option<f64>> = vec![None; world.keys.len()];
         for setting in query.split('&').filter(|s| !s.is_empty()) {
             let (key, value) = setting.split_once('=').unwrap_or((setting, ""));
             let at = world.keys.iter().position(|k| k.name == key).ok_or_else(|| unknown_key(world, key))?;
@@ -120,6 +144,7 @@ impl Values {
                 key: info.name,
                 value: value.to_owned(),
                 fault,
+                kind: info.kind(),
                 min: info.min,
                 max: info.max,
             };
@@ -128,31 +153,39 @@ impl Values {
             }
             let word = words(world.name, info.name).iter().position(|w| *w == value);
             let number = match word {
-                Some(at) => at as u64,
-                None => value.parse().map_err(|_| wrong("is no whole number"))?,
+                Some(at) => at as f64,
+                None => info.read(value).ok_or_else(|| {
+                    wrong(if info.takes_fractions() { "is no number" } else { "is no whole number" })
+                })?,
             };
-            if !(info.min..=info.max).contains(&number) {
+            if !(info.min as f64..=info.max as f64).contains(&number) {
                 return Err(wrong("is out of range"));
             }
             given[at] = Some(number);
         }
-        let mut values: Vec<u64> = Vec::with_capacity(given.len());
+        let mut values: Vec<f64> = Vec::with_capacity(given.len());
         for (info, given) in world.keys.iter().zip(given) {
             values.push(given.unwrap_or_else(|| match info.default {
-                KeyDefault::Number(n) => n,
+                KeyDefault::Number(n) => n as f64,
+                KeyDefault::Fraction(number) => number,
                 KeyDefault::SameAs(other) => value_of(world.keys, &values, other),
             }));
         }
         Ok(Values { keys: world.keys, values })
     }
 
-    /// The value of a key that the world declares.
+    /// The value of a key that the world declares, a whole number.
     pub(crate) fn get(&self, key: &str) -> u64 {
+        self.fraction(key) as u64
+    }
+
+    /// The value of a key that the world declares, whole or not.
+    pub(crate) fn fraction(&self, key: &str) -> f64 {
         value_of(self.keys, &self.values, key)
     }
 }
 
-fn value_of(keys: &[KeyInfo], values: &[u64], key: &str) -> u64 {
+fn value_of(keys: &[KeyInfo], values: &[f64], key: &str) -> f64 {
     let at = keys.iter().position(|k| k.name == key);
     values[at.expect("a world reads only keys that it declares")]
 }
@@ -174,6 +207,7 @@ mod tests {
     const KEYS: &[KeyInfo] = &[
         KeyInfo { name: "n", description: "", min: 1, max: 9, default: KeyDefault::Number(3) },
         KeyInfo { name: "nx", description: "", min: 1, max: 9, default: KeyDefault::SameAs("n") },
+        KeyInfo { name: "pace", description: "", min: 0, max: 8, default: KeyDefault::Fraction(1.5) },
     ];
     const WORLD: WorldInfo = WorldInfo { name: "w", description: "", keys: KEYS, make: |_| Scene::default() };
 
@@ -187,18 +221,26 @@ mod tests {
         assert_eq!(of(""), Ok((3, 3)));
         assert_eq!(of("n=5"), Ok((5, 5)));
         assert_eq!(of("nx=2&n=7"), Ok((7, 2)));
+        let pace = |query| Values::parse(&WORLD, query).map(|v| v.fraction("pace"));
+        assert_eq!((pace(""), pace("pace=0.125"), pace("pace=3")), (Ok(1.5), Ok(0.125), Ok(3.0)));
     }
 
     #[test]
     fn mistakes_say_what_may_be_written() {
         assert_eq!(
             fault("m=2"),
-            "world w has no key \"m\"; it has n (1 to 9, default 3), nx (1 to 9, default as n)"
+            "world w has no key \"m\"; it has n (1 to 9, default 3), nx (1 to 9, default as n), pace (any number \
+             from 0 to 8, default 1.5)"
         );
         assert_eq!(fault("n=0"), "world w: n=0 is out of range; n is a whole number from 1 to 9");
         assert_eq!(fault("n=1.5"), "world w: n=1.5 is no whole number; n is a whole number from 1 to 9");
         assert!(fault("n").contains("n= is no whole number"));
         assert!(fault("n=1&n=2").contains("second value"));
         assert!(fault("n=99999999999999999999999").contains("is no whole number"));
+        for (value, what) in [("-0.125", "out of range"), ("inf", "out of range"), ("8.01", "out of range")] {
+            assert!(fault(&format!("pace={value}")).contains(what), "{value}");
+        }
+        assert_eq!(fault("pace=NaN"), "world w: pace=NaN is no number; pace is a number from 0 to 8");
+        assert!(fault("pace=").contains("is no number"));
     }
 }

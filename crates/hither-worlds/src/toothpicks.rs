@@ -30,8 +30,10 @@ pub(crate) const INFO: WorldInfo = WorldInfo {
             1,
             0,
         ),
-        number("speed", "velocities are multiplied by this", 0, 1024, 1),
-        number("slower", "and divided by this", 1, 1024, 1),
+        KeyInfo {
+            default: KeyDefault::Fraction(1.0),
+            ..number("speed", "velocities are multiplied by this", 0, 1024, 1)
+        },
         number("frames", "length, sixtieths of a second", 1, 100_000, 250),
         number("seed", "other toothpicks of the same kind", 0, u32::MAX as u64, 1),
     ],
@@ -64,7 +66,7 @@ const CAMERA_DISTANCE: f64 = 4.8;
 fn toothpicks(values: &Values) -> Scene {
     let n = values.get("n");
     let scale = if values.get("density") == 0 { libm::cbrt(200.0 / n as f64) } else { 1.0 };
-    let pace = values.get("speed") as f64 / values.get("slower") as f64;
+    let pace = values.fraction("speed");
     let duration = values.get("frames") as f64 / FRAMES_A_SECOND;
     let mut scene = Scene::new(INFO.name);
     scene.materials = vec![paint("frame", 0x8a8f98)];

@@ -310,3 +310,33 @@ fn clearance(scene: &Scene, p: DVec3) -> f64 {
     let meshes = scene.meshes.iter();
     meshes.flat_map(|m| m.triangles.iter().map(move |t| of_triangle(m, t))).fold(f64::INFINITY, f64::min)
 }
+
+#[test]
+fn speeds_may_be_fractions_and_are_numbers_in_range() {
+    for (name, keys) in [("toothpicks", ""), ("canyon", "grid=1&")] {
+        let mut usual = world(&format!("{name}?{keys}speed=1"));
+        let mut slow = world(&format!("{name}?{keys}speed=0.125"));
+        let duration = usual.animations[0].duration();
+        assert_eq!(slow.animations[0].duration(), duration);
+        // Times at which either has keys.
+        for k in 0..5 {
+            let time = duration * f64::from(k) / 42.0;
+            usual.pose(0, time);
+            slow.pose(0, time * 8.0);
+            let eyes = [&usual, &slow].map(|s| s.view(0, (64, 48)).unwrap().eye_in_world());
+            assert!(eyes[0].distance(eyes[1]) < 1e-3 * eyes[0].length(), "{name} {k}: {eyes:?}");
+            for (a, b) in usual.instances().iter().zip(slow.instances()) {
+                let (a, b) = (a.world_from_mesh, b.world_from_mesh);
+                assert!(a.translation.distance(b.translation) < 1e-3, "{name} {k}");
+                assert!((a.matrix3.x_axis - b.matrix3.x_axis).length() < 1e-3, "{name} {k}");
+            }
+        }
+        for wrong in ["-1", "NaN", "inf", "-inf", "1e9", "fast", ""] {
+            let fault = generate(&format!("{name}?speed={wrong}")).map(drop).unwrap_err().to_string();
+            assert!(
+                fault.contains(&format!("speed={wrong} is "))
+                    && fault.contains("speed is a number from 0 to")
+            );
+        }
+    }
+}

@@ -2,6 +2,7 @@
 
 mod focus;
 mod reuse;
+mod verify;
 mod write;
 
 use super::report;
@@ -9,7 +10,7 @@ use super::sorting::{LayerOptions, PartOptions, Sorting};
 use crate::console::Verbosity;
 use crate::eye::Eye;
 use crate::failure::Failure;
-use crate::numbers::{count, grouped, short};
+use crate::numbers::count;
 use crate::options::{ReportOptions, ShadeName, ViewOptions};
 use crate::outputs;
 use crate::source;
@@ -17,7 +18,9 @@ use crate::timeline::Timeline;
 use focus::FocusOptions;
 use hither::Scene;
 use hither::conventions::View;
-use hither::layers::{Canvas, Component, Expression, LayerPainter, PaintOptions, Painted, Program, Sprite};
+use hither::layers::{
+    Canvas, Component, Expression, Holdout, LayerPainter, Openness, PaintOptions, Painted, Program, Sprite,
+};
 use hither::order::SortOptions;
 use hither::render::RenderOptions;
 use reuse::Reuse;
@@ -136,7 +139,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         say(verbosity, &taken, output.as_deref(), timeline.numbered);
         let check = match arguments.verify {
-            true => Some(verify(&taken, &view, &mut painter, &paint, verbosity)?),
+            true => Some(verify::verify(&taken, &view, &mut painter, &paint, verbosity)?),
             false => None,
         };
         let focus =
@@ -204,22 +207,29 @@ fn take_apart(
 ) -> Result<Taken, Failure> {
     sorting.sort(scene, view);
     let (mut components, held_out) = sorting.components(&arguments.layers, painter, view, paint)?;
+    let replacement =
+        |parts: &[u32]| replacements.iter().find(|(name, _)| parts.iter().any(|&p| sorting.name(p) == *name));
     let bar =
         arguments.report.verbosity().bar(components.iter().map(|c| c.layers.len() as u64).sum(), "layers");
     let mut layers = Vec::new();
+    let mut open = Openness::new(view, paint);
     for component in &mut components {
-        let mut kept = Vec::new();
-        for (at, parts) in component.layers.iter().enumerate() {
-            let instances = sorting.instances_of(parts);
+        let mut drawn = Vec::new();
+        for parts in &component.layers {
             let holdout = parts.iter().find_map(|part| held_out.get(part));
-            let mut painted = painter
-                .paint_held_out(&instances, view, paint, holdout)
-                .map_err(|e| Failure::work(e.to_string()))?;
+            let instances = sorting.instances_of(parts);
+            let layer = painter.draw(&instances, view, paint, holdout);
+            let mut layer = layer.map_err(|e| Failure::work(e.to_string()))?;
+            layer.counts = replacement(parts).is_none();
+            drawn.push(layer);
             bar.inc(1);
+        }
+        let painted = open.settle(drawn, &component.arcs);
+        let mut kept = Vec::new();
+        for ((at, parts), mut painted) in (0u32..).zip(&component.layers).zip(painted) {
             let name = parts.iter().map(|&p| sorting.name(p)).collect::<Vec<_>>().join(" + ");
-            let replacement = replacements.iter().find(|(n, _)| parts.iter().any(|&p| sorting.name(p) == *n));
             let mut out = false;
-            match replacement {
+            match replacement(parts) {
                 Some((_, Some(sprite))) => {
                     painted.distances = vec![f32::INFINITY; sprite.pixels.len()];
                     painted.sprite = sprite.clone();
@@ -230,8 +240,8 @@ fn take_apart(
             if arguments.leave_out_empty && painted.sprite.is_empty() {
                 continue;
             }
-            kept.push(at as u32);
-            let held_out = holdout.map_or(0, |h| h.samples());
+            kept.push(at);
+            let held_out = parts.iter().find_map(|part| held_out.get(part)).map_or(0, Holdout::samples);
             layers.push(Layer { name, parts: parts.clone(), painted, out, held_out });
         }
         keep(component, &kept);
@@ -293,58 +303,6 @@ fn say(verbosity: Verbosity, taken: &Taken, output: Option<&Path>, numbered: boo
             "one layer holds {largest} of {parts} parts, which occlude each other both ways; --holdout keeps them apart"
         ));
     }
-}
-
-/// How the composite differs from the direct picture.
-fn verify(
-    taken: &Taken,
-    view: &View,
-    painter: &mut LayerPainter,
-    paint: &PaintOptions,
-    verbosity: Verbosity,
-) -> Result<Value, Failure> {
-    let direct = painter.paint_all(view, paint).map_err(|e| Failure::work(e.to_string()))?.sprite;
-    let direct = direct.expanded(view.width, view.height);
-    let mut partial = vec![0u8; direct.len()];
-    for sprite in taken.layers.iter().map(|l| &l.painted.sprite) {
-        for (i, pixel) in sprite.pixels.iter().enumerate() {
-            if pixel[3] > 0.0 && pixel[3] < 1.0 {
-                let (x, y) = (sprite.x + i as u32 % sprite.width, sprite.y + i as u32 / sprite.width);
-                let count = &mut partial[(y * view.width + x) as usize];
-                *count = count.saturating_add(1);
-            }
-        }
-    }
-    let mut differing = 0u64;
-    // More than 1/255 off, where at most one, two, or more layers cover the pixel in part.
-    let mut beyond = [0u64; 3];
-    let mut largest = 0.0f32;
-    for ((a, b), partial) in taken.composite.pixels.iter().zip(&direct).zip(&partial) {
-        let off = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        differing += u64::from(a != b);
-        largest = largest.max(off);
-        if off > 1.0 / 255.0 {
-            beyond[usize::from((*partial).clamp(1, 3)) - 1] += 1;
-        }
-    }
-    let line = match differing {
-        0 => "the composite is the direct picture, bit for bit".to_owned(),
-        n => format!(
-            "{} pixels differ from the direct picture, by {} at most; off by more than 1/255: {} where one layer is \
-             partial, {} where two are, {} where more are",
-            grouped(n),
-            short(f64::from(largest)),
-            grouped(beyond[0]),
-            grouped(beyond[1]),
-            grouped(beyond[2])
-        ),
-    };
-    verbosity.note(&line);
-    Ok(json!({
-        "pixels_differing": differing,
-        "largest_difference": largest,
-        "beyond_one_in_255": { "one_partial": beyond[0], "two_partial": beyond[1], "more_partial": beyond[2] },
-    }))
 }
 
 fn frame_json(

@@ -26,13 +26,13 @@ pub struct PartOptions {
     /// Make hulls smaller by so many per cent: parts that only touch then have an order
     #[arg(long, value_name = "PERCENT", default_value_t = 0.0, value_parser = percent)]
     shrink: f64,
-    /// Parts that are behind all others, as a sky is
-    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
+    /// Parts that are behind all others, as a sky is; by name or number
+    #[arg(long, value_name = "NAME|INDEX,…", value_delimiter = ',')]
     backdrop: Vec<String>,
-    /// Cut the meshes of, and below, a node into pieces that are parts of their own: `NAME=grid:NxM` over x and z,
-    /// `NAME=cylinder:SECTORSxHEIGHTS` about its upright axis, `NAME=boxes:NxMxK`, or `NAME=adaptive:N`, up to N pieces
-    /// where it is least convex
-    #[arg(long, value_name = "NAME=HOW", value_parser = pieces)]
+    /// Cut the meshes of, and below, a node, or a part by its number, into pieces that are parts of their own:
+    /// `NAME=grid:NxM` over x and z, `NAME=cylinder:SECTORSxHEIGHTS` about its upright axis, `NAME=boxes:NxMxK`, or
+    /// `NAME=adaptive:N`, up to N pieces where it is least convex
+    #[arg(long, value_name = "NAME|INDEX=HOW", value_parser = pieces)]
     split: Vec<(String, SplitBy)>,
     /// By how many per cent a piece is larger, so that no gap shows between pieces
     #[arg(long, value_name = "PERCENT", default_value_t = 20.0, value_parser = overlap, requires = "split")]
@@ -201,8 +201,9 @@ impl Sorting {
         parts.add_to(&mut sort);
         let seams = tell(&mut sort, &parts, scene, prepared);
         for name in &options.backdrop {
-            let found = parts.parts.iter().position(|p| p.name == *name);
-            let part = found.ok_or_else(|| {
+            let named = parts.parts.iter().position(|p| p.name == *name);
+            let numbered = || name.parse().ok().filter(|&number: &usize| number < parts.parts.len());
+            let part = named.or_else(numbered).ok_or_else(|| {
                 Failure::work(format!(
                     "{source}: no part \"{name}\"; `hither order` lists the names there are"
                 ))

@@ -22,6 +22,8 @@ const SCANNED: usize = 12;
 const FLAT: f64 = 1e-10;
 /// A hull may leave a point out by this share of its size; extents are padded by more.
 const TOLERANCE: f64 = 1e-9;
+/// A hull so many times as long as it is wide is a needle.
+const NEEDLE: f64 = 3.0;
 /// Beyond this many (point, face) pairs a hull is checked along directions instead.
 const MOST_CHECKS: usize = 40_000_000;
 
@@ -36,6 +38,12 @@ pub struct Hull {
     triangles: Vec<[u32; 3]>,
     bounds: Aabb,
     radius: f64,
+    roundness: f64,
+    needle: Option<usize>,
+    /// For directions all around a summit nearby; empty where vertices are looked at one by one.
+    summits: Vec<u32>,
+    /// Cells along a side of a face of the cube that these directions go through.
+    side: usize,
 }
 
 impl Default for Hull {
@@ -48,6 +56,10 @@ impl Default for Hull {
             triangles: Vec::new(),
             bounds: Aabb::EMPTY,
             radius: 0.0,
+            roundness: 0.0,
+            needle: None,
+            summits: Vec::new(),
+            side: 0,
         }
     }
 }
@@ -87,7 +99,51 @@ impl Hull {
         self.bounds = Aabb::around(self.vertices.iter().copied());
         let center = self.center();
         self.radius = self.vertices.iter().map(|v| v.distance(center)).fold(0.0, f64::max);
+        let half = self.bounds.size() * 0.5;
+        // A flat hull has no extent along an axis, and no vertex off the middle there.
+        let in_box = |v: &DVec3| ((*v - center) / half.max(DVec3::splat(f64::MIN_POSITIVE))).length();
+        self.roundness = self.vertices.iter().map(in_box).fold(0.0, f64::max) * (1.0 + TOLERANCE);
+        let size = self.bounds.size();
+        let is_long = |&k: &usize| size[k] > NEEDLE * size[(k + 1) % 3].max(size[(k + 2) % 3]);
+        self.needle = (0..3).find(is_long);
+        if !self.starts.is_empty() {
+            self.list_summits();
+        }
         self
+    }
+
+    /// Finds the summit in the middle of each cell, about as many as vertices.
+    fn list_summits(&mut self) {
+        self.summits.clear();
+        let side = (self.vertices.len() as f64 / 6.0).sqrt().ceil().min(16.0);
+        self.side = side as usize;
+        let half = self.bounds.size() * 0.5;
+        let mut summit = 0;
+        for face in 0..6 {
+            let (k, sign) = (face % 3, if face < 3 { 1.0 } else { -1.0 });
+            for cell in 0..self.side * self.side {
+                let middle = |i: usize| (2.0 * i as f64 + 1.0) / side - 1.0;
+                let mut direction = DVec3::ZERO;
+                direction[k] = sign;
+                direction[(k + 1) % 3] = middle(cell % self.side);
+                direction[(k + 2) % 3] = middle(cell / self.side);
+                summit = self.climb(direction / half.max(DVec3::splat(f64::MIN_POSITIVE)), summit);
+                self.summits.push(summit);
+            }
+        }
+    }
+
+    /// A vertex near the one that is farthest along `direction`. Cells are of directions as they are where the box
+    /// around the hull is a cube: of a needle's summits most lie in directions nearly across it.
+    fn listed(&self, direction: DVec3) -> Option<u32> {
+        let d = (direction * self.bounds.size()).to_array();
+        let k = if d[0].abs() >= d[1].abs() { 0 } else { 1 };
+        let k = if d[k].abs() >= d[2].abs() { k } else { 2 };
+        let scale = 0.5 * self.side as f64 / d[k].abs();
+        // A cast takes NaN and what is negative for 0.
+        let cell = |i: usize| ((d[(k + i) % 3] * scale + 0.5 * self.side as f64) as usize).min(self.side - 1);
+        let face = if d[k] > 0.0 { k } else { k + 3 };
+        self.summits.get((face * self.side + cell(2)) * self.side + cell(1)).copied()
     }
 
     /// The extreme points; at least one.
@@ -108,6 +164,17 @@ impl Hull {
     /// The smallest box around it, along its own axes.
     pub fn bounds(&self) -> &Aabb {
         &self.bounds
+    }
+
+    /// By how much the half sides of [`Hull::bounds`] are multiplied to be the semiaxes of an ellipsoid around the
+    /// hull: from 1, for an ellipsoid, to √3, where a corner of the box is a vertex.
+    pub fn roundness(&self) -> f64 {
+        self.roundness
+    }
+
+    /// The axis along which it is several times as long as across, if there is one.
+    pub fn needle(&self) -> Option<usize> {
+        self.needle
     }
 
     /// The radius of that sphere.
@@ -133,7 +200,8 @@ impl Hull {
     }
 
     /// The vertex farthest along `direction`, from vertex `start` uphill. Any `start` below the number of
-    /// vertices gives a summit; a good one saves steps.
+    /// vertices gives a summit; a good one saves steps. One that is not the summit is followed by what is listed for
+    /// such directions.
     #[inline]
     pub fn climb(&self, direction: DVec3, start: u32) -> u32 {
         let height = |v: u32| self.vertices[v as usize].dot(direction);
@@ -158,6 +226,14 @@ impl Hull {
             }
             if at == from {
                 return at;
+            }
+            if from == start
+                && let Some(listed) = self.listed(direction)
+            {
+                let here = height(listed);
+                if here > best {
+                    (at, best) = (listed, here);
+                }
             }
         }
     }

@@ -1,6 +1,8 @@
 //! Whether two convex bodies are disjoint, with a witness that is kept for the next time.
 //!
-//! Chung's iteration first: a direction is tried, and reflected while it fails. After four failures Gilbert's:
+//! Chung's iteration first: a direction is tried, and reflected while it fails; for needles seen from the eye the planes
+//! through the eye and a needle are tried instead, for of two segments on the screen that do not cross, the line of one
+//! parts them. After four failures Gilbert's:
 //! the point nearest to the origin in the Minkowski difference, on a simplex of at most four points
 //! [Snyder & Lengyel 1997, app. B; Chung & Wang 1996; Gilbert, Johnson & Keerthi 1988]. Both only ever ask for
 //! a body's farthest vertex in a direction. One body may be extended by the origin, where the eye is: the hull
@@ -143,21 +145,41 @@ impl Search<'_> {
     }
 
     fn chung(&mut self, direction: &mut DVec3) -> bool {
-        for _ in 0..CHUNG_STEPS {
+        let mut guesses = [None; 2].into_iter();
+        for step in 0..CHUNG_STEPS {
             let Some(unit) = direction.try_normalize() else { return false };
             *direction = unit;
             let (least, of) = self.least(unit);
             if unit.dot(least) > self.margin {
                 return true;
             }
-            if self.simplex.holds(least) {
+            if step == 0 && self.a.with_origin {
+                guesses = [self.beside(self.b), self.beside(self.a)].into_iter();
+            }
+            let guess = guesses.by_ref().flatten().next();
+            let known = self.simplex.holds(least);
+            if !known {
+                self.simplex.add((least, of));
+            }
+            if let Some(guess) = guess {
+                *direction = guess;
+                continue;
+            }
+            if known {
                 return false;
             }
-            self.simplex.add((least, of));
             let Some(along) = least.try_normalize() else { return false };
             *direction = unit - along * (2.0 * along.dot(unit));
         }
         false
+    }
+
+    /// Across the plane through the origin and a needle, towards `b`.
+    fn beside(&self, needle: &Body) -> Option<DVec3> {
+        let axis = needle.outer_from_hull.matrix3.col(needle.hull.needle()?);
+        let across = axis.cross(needle.center());
+        let side = across.dot(self.b.center() - self.a.center());
+        Some(across * side.signum())
     }
 
     fn gilbert(&mut self, direction: &mut DVec3) -> bool {

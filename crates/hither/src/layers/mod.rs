@@ -11,9 +11,11 @@
 //! by its own circle of confusion, and [`reuse`](mod@reuse) warps what was drawn before instead of drawing it again.
 //!
 //! Where pixels are either covered or not, the composite is the direct picture to the last bit. Where coverage is
-//! fractional it is the usual approximation: edges in a pixel are taken as independent.
+//! fractional, each layer's is that of what the layers before it leave open ([`Openness`]), and the composite is the
+//! direct picture up to rounding, but for pixels that three layers of one cycle share.
 
 mod components;
+mod coverage;
 pub mod depth_of_field;
 mod expression;
 mod paint;
@@ -26,6 +28,7 @@ mod sprite;
 mod tests;
 
 pub use components::{Component, Mutual, decompose, decompose_by_sight};
+pub use coverage::{Drawn, Openness};
 pub use expression::{Expression, sum_of_outs};
 pub use paint::{LayerPainter, PaintOptions, Painted};
 pub use program::{Instruction, Operation, Program, Register, Source};

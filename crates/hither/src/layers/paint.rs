@@ -5,6 +5,7 @@
 //! numbers, ties in depth are decided as in the whole picture, and a layer's pixels are the whole picture's to
 //! the last bit wherever it is in front.
 
+use super::coverage::Drawn;
 use super::sight::Holdout;
 use super::sprite::Sprite;
 use crate::conventions::{View, ViewError};
@@ -99,17 +100,18 @@ impl LayerPainter {
         view: &View,
         options: &PaintOptions,
     ) -> Result<Painted, ViewError> {
-        self.paint_held_out(instances, view, options, None)
+        Ok(self.draw(instances, view, options, None)?.alone)
     }
 
-    /// Draws `instances` alone, without what is held out of them. Memory while it works: some hundred bytes a sample.
-    pub fn paint_held_out(
+    /// Draws `instances` alone, without what is held out of them, for [`Openness::settle`](super::Openness::settle).
+    /// Memory while it works: some hundred bytes a sample.
+    pub fn draw(
         &mut self,
         instances: &[u32],
         view: &View,
         options: &PaintOptions,
         holdout: Option<&Holdout>,
-    ) -> Result<Painted, ViewError> {
+    ) -> Result<Drawn, ViewError> {
         self.show(instances, view);
         let samples = options.samples.max(1);
         let fine = options.fine(view);
@@ -136,9 +138,10 @@ impl LayerPainter {
         let distances = rows
             .flat_map(|y| (sprite.x..sprite.x + sprite.width).map(move |x| (x, y)))
             .map(|(x, y)| mean(x, y));
-        let painted = Painted { distances: distances.collect(), sprite };
+        let alone = Painted { distances: distances.collect(), sprite };
+        let samples = if samples > 1 { Sprite::cut(fine.width, &image.pixels) } else { Sprite::default() };
         self.renderer.recycle(frame);
-        Ok(painted)
+        Ok(Drawn { alone, counts: true, samples })
     }
 
     /// Puts `instances` in their places and all others out of sight.

@@ -166,10 +166,13 @@ fn both_ways(scene: &Scene, view: &View, options: &PaintOptions, by: By) -> Both
         }
     };
     let mut sprites = Vec::new();
-    for layer in components.iter().flat_map(|c| &c.layers) {
-        let holdout = held_out.get(&layer[0]);
-        let painted = painter.paint_held_out(&instances(layer), view, options, holdout);
-        sprites.push(painted.unwrap().sprite);
+    let mut open = Openness::new(view, options);
+    for component in &components {
+        let mut draw = |layer: &Vec<u32>| {
+            painter.draw(&instances(layer), view, options, held_out.get(&layer[0])).unwrap()
+        };
+        let drawn = component.layers.iter().map(&mut draw).collect();
+        sprites.extend(open.settle(drawn, &component.arcs).into_iter().map(|p| p.sprite));
     }
     let size = (view.width, view.height);
     let composite = Program::compile(&components).run(size, |l| Some(&sprites[l as usize]));
@@ -260,65 +263,58 @@ fn blended_scenes_come_back_whatever_is_in_a_cycle() {
     assert!(merged > 50 && blended > 10_000, "{cycles} cycles, {merged} merged, {blended} blended pixels");
 }
 
-/// What the samples of a pixel say of the layers there.
+/// Pixels by the layers that cover them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Pixel {
-    /// At most one layer covers it in part, and if one does, each is of one colour there up to half a part in 255:
-    /// nothing is approximated.
+    /// At most one does so in part.
     Simple,
-    /// One layer covers it in part, and one is of several colours there: which of them is covered is forgotten.
-    Colors,
-    /// Two layers cover it in part: their edges are taken as independent.
-    Two,
-    /// More do; in a cycle, what [Snyder & Lengyel 1997, §8] except.
-    More,
+    /// Several do.
+    Several,
+    /// Three of one cycle cover it, at least one of them in part: what [Snyder & Lengyel 1997, §8] except.
+    ThreeOfACycle,
 }
 
-fn kind(samples: &[Sprite], (x, y): (u32, u32), n: u32) -> Pixel {
-    let (mut partial, mut colors) = (0, false);
-    for sprite in samples {
-        let all: Vec<[f32; 4]> = (0..n * n).map(|i| sprite.at(x * n + i % n, y * n + i / n)).collect();
-        let covered: Vec<&[f32; 4]> = all.iter().filter(|c| c[3] > 0.0).collect();
-        partial += usize::from(!covered.is_empty() && covered.len() < all.len());
-        colors |= covered.iter().any(|c| c.iter().zip(covered[0]).any(|(a, b)| (a - b).abs() > 0.5 / 255.0));
+fn kind(samples: &[Sprite], components: &[Component], (x, y): (u32, u32), n: u32) -> Pixel {
+    let covered =
+        |sprite: &Sprite| (0..n * n).filter(|i| sprite.at(x * n + i % n, y * n + i / n)[3] > 0.0).count();
+    let counts: Vec<usize> = samples.iter().map(covered).collect();
+    let partial = |layers: &[usize]| layers.iter().filter(|&&c| c > 0 && c < (n * n) as usize).count();
+    let mut first = 0;
+    for component in components {
+        let layers = &counts[first..first + component.layers.len()];
+        first += layers.len();
+        if layers.iter().filter(|&&c| c > 0).count() > 2 && partial(layers) > 0 {
+            return Pixel::ThreeOfACycle;
+        }
     }
-    match partial {
-        1 if colors => Pixel::Colors,
-        0 | 1 => Pixel::Simple,
-        2 => Pixel::Two,
-        _ => Pixel::More,
-    }
+    if partial(&counts) < 2 { Pixel::Simple } else { Pixel::Several }
 }
 
 #[test]
-fn with_coverage_only_what_is_approximated_differs_and_is_counted() {
+fn with_coverage_only_pixels_that_three_layers_of_a_cycle_share_are_approximate() {
     const SAMPLES: u32 = 3;
     let options = PaintOptions { samples: SAMPLES, shading: Shading::Flat, ..PaintOptions::default() };
-    // Covered pixels of each kind, and how many of them are off by more than one part in 255.
-    let mut counts = [(0u32, 0u32); 4];
+    // Covered pixels of each kind.
+    let mut counts = [0u32; 3];
+    let mut largest = 0.0f32;
     for (seed, by) in (0..60).zip(WAYS.into_iter().cycle()) {
-        let (scene, view) = strewn(seed, true);
-        let BothWays { composite, direct, .. } = both_ways(&scene, &view, &options, by);
+        let (scene, view) = strewn(seed, seed % 2 == 0);
+        let BothWays { composite, direct, components, .. } = both_ways(&scene, &view, &options, by);
         let fine = View { width: view.width * SAMPLES, height: view.height * SAMPLES, ..view };
         let alone = PaintOptions { samples: 1, ..options };
         let samples = both_ways(&scene, &fine, &alone, by).sprites;
         for (at, (a, b)) in (0u32..).zip(composite.pixels.iter().zip(&direct.pixels)) {
             let place = (at % view.width, at / view.width);
-            let kind = kind(&samples, place, SAMPLES);
+            let kind = kind(&samples, &components, place, SAMPLES);
             let off = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-            assert!(kind != Pixel::Simple || off <= 1.0 / 255.0, "seed {seed} {place:?}: {a:?} {b:?}");
-            assert!(
-                kind != Pixel::Colors || (a[3] - b[3]).abs() < 1e-6,
-                "seed {seed} {place:?}: {a:?} {b:?}"
-            );
-            let (all, beyond) = &mut counts[kind as usize];
-            *all += u32::from(b[3] > 0.0);
-            *beyond += u32::from(off > 1.0 / 255.0);
+            counts[kind as usize] += u32::from(b[3] > 0.0);
+            if kind != Pixel::ThreeOfACycle {
+                largest = largest.max(off);
+                assert!(off < 1e-5, "seed {seed} {by:?} {place:?} {kind:?}: {a:?} {b:?}");
+            }
         }
     }
-    let [simple, colors, two, more] = counts;
-    assert_eq!(simple.1, 0);
-    assert!(simple.0 > 5_000 && colors.1 <= colors.0 && two.1 > 0 && more.1 > 0, "{counts:?}");
+    assert!(counts[0] > 5_000 && counts[1] > 500, "{counts:?}, off by {largest}");
 }
 
 /// Two panes that cross, and a third beside them that does not.
@@ -379,5 +375,11 @@ fn a_ring_of_bars_is_three_layers_and_their_expression_is_the_picture() {
         assert_eq!(components[0].layers.len(), 3);
         assert!(composite == direct);
         assert!(direct.pixels.iter().filter(|p| p[3] > 0.0).count() > 2000);
+        // Nowhere do all three meet in a pixel.
+        let smooth = PaintOptions { samples: 4, ..PaintOptions::default() };
+        let BothWays { composite, direct, .. } = both_ways(&scene, &view, &smooth, by);
+        let pairs = composite.pixels.as_flattened().iter().zip(direct.pixels.as_flattened());
+        let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(off < 1e-5, "{off}");
     }
 }

@@ -25,7 +25,7 @@ struct Group {
 
 impl VisibilitySort {
     pub(super) fn condition(&mut self) {
-        let order = &self.order;
+        let order = &self.seated;
         let key = |g: &[u32]| {
             let part = &self.parts[g[0] as usize];
             (part.distance, part.distance + part.radius)
@@ -64,13 +64,13 @@ impl VisibilitySort {
         let parts = groups.iter().flat_map(members).copied().collect();
         let mut end = 0;
         let sizes = groups.iter().map(|g| g.end - g.from);
-        self.order.ends = sizes
+        self.seated.ends = sizes
             .map(|size| {
                 end += size;
                 end
             })
             .collect();
-        self.order.parts = parts;
+        self.seated.parts = parts;
         self.counters.moved_up = moved;
     }
 

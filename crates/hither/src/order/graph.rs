@@ -10,7 +10,8 @@ impl VisibilitySort {
     /// ascending order. Parts that are not in the order have none. Cost: quadratic in the number of parts, and
     /// little for pairs whose extents do not meet.
     pub fn arcs_among(&mut self, parts: &[u32]) -> Vec<(u32, u32)> {
-        let present: Vec<u32> = parts.iter().copied().filter(|&p| self.parts[p as usize].present).collect();
+        let present = |part: &u32| self.parts[self.seats[*part as usize] as usize].present;
+        let present: Vec<u32> = parts.iter().copied().filter(present).collect();
         let mut arcs = Vec::new();
         for &front in &present {
             for &behind in &present {
@@ -26,8 +27,9 @@ impl VisibilitySort {
 
     /// Whether `front` occludes `behind` from the eye of the last sort; both must be in the order.
     pub fn part_occludes(&mut self, front: u32, behind: u32) -> bool {
-        for f in self.parts[front as usize].pieces() {
-            for b in self.parts[behind as usize].pieces() {
+        let [front, behind] = [front, behind].map(|part| self.seats[part as usize] as usize);
+        for f in self.parts[front].pieces() {
+            for b in self.parts[behind].pieces() {
                 let pair = Pair { front: f as u32, behind: b as u32 };
                 if self.faces.may_occlude(pair.front, pair.behind)
                     && self.occludes(pair, &mut Witness::default())
@@ -42,17 +44,13 @@ impl VisibilitySort {
     /// Whether what is known of two parts ([`Known`](super::Known)) says that `front` does not occlude `behind` from
     /// the eye of the last sort.
     pub fn rules_out(&self, front: u32, behind: u32) -> bool {
-        self.known_says(front, behind) == Some(Says::No)
+        let seat = |part: u32| self.seats[part as usize];
+        self.known_says(seat(front), seat(behind)) == Some(Says::No)
     }
 
     /// All arcs of the occlusion graph, ascending. Cost: linear in candidate pairs, of which there are many more
     /// than a sort looks at.
     pub fn arcs(&mut self) -> Vec<(u32, u32)> {
-        for part in &self.parts {
-            for piece in part.pieces() {
-                self.alive[piece] = part.present;
-            }
-        }
         self.faces.restore();
         let mut arcs = Vec::new();
         for part in 0..self.parts.len() as u32 {
@@ -62,12 +60,12 @@ impl VisibilitySort {
             let mut pairs = Vec::new();
             for behind in self.parts[part as usize].pieces() {
                 let behind = behind as u32;
-                self.faces.occluders(behind, &self.alive, |front| pairs.push(Pair { front, behind }));
+                self.faces.occluders(behind, |front| pairs.push(Pair { front, behind }));
             }
             for pair in pairs {
                 let front = self.pieces[pair.front as usize].part;
                 if front != part && self.occludes(pair, &mut Witness::default()) {
-                    arcs.push((front, part));
+                    arcs.push((self.number(front), self.number(part)));
                 }
             }
         }
@@ -80,7 +78,7 @@ impl VisibilitySort {
     /// intersect occlude each other and so share a group. Cost: quadratic in the size of the groups.
     pub fn intersecting_pairs(&mut self) -> Vec<(u32, u32)> {
         let groups: Vec<Vec<u32>> =
-            self.order.groups().filter(|g| g.len() > 1).map(<[u32]>::to_vec).collect();
+            self.seated.groups().filter(|g| g.len() > 1).map(<[u32]>::to_vec).collect();
         let mut found = Vec::new();
         for group in groups {
             for (i, &a) in group.iter().enumerate() {
@@ -91,6 +89,7 @@ impl VisibilitySort {
                         })
                     });
                     if meet {
+                        let (a, b) = (self.number(a), self.number(b));
                         found.push((a.min(b), a.max(b)));
                     }
                 }

@@ -20,6 +20,7 @@ mod known;
 mod pairs;
 mod parts;
 mod presplit;
+mod seats;
 mod sort;
 mod split;
 #[cfg(test)]

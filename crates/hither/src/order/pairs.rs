@@ -6,7 +6,7 @@
 
 use crate::geometry::Witness;
 
-/// `front` may occlude part of `behind`; both are pieces.
+/// `front` may occlude part of `behind`; both are pieces, by their seats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Pair {
     pub(super) front: u32,
@@ -36,6 +36,17 @@ impl Pairs {
         self.runs.clear();
         self.runs.resize(parts, (0, 0));
         self.old_runs.resize(parts, (0, 0));
+    }
+
+    /// The parts and pieces of the last frame have moved to other seats.
+    pub(super) fn move_to(&mut self, part_seats: &[u32], piece_seats: &[u32]) {
+        let seat = |piece: u32| piece_seats[piece as usize];
+        for pair in &mut self.pairs {
+            *pair = Pair { front: seat(pair.front), behind: seat(pair.behind) };
+        }
+        let mut runs = vec![(0, 0); part_seats.len()];
+        self.runs.iter().zip(part_seats).for_each(|(&run, &seat)| runs[seat as usize] = run);
+        self.runs = runs;
     }
 
     /// The pairs from `start` on are those of `part`: finds their witnesses. Returns the run.

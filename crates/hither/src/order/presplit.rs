@@ -3,7 +3,7 @@
 use super::known::Known;
 use super::parts::PartsError;
 use super::split::{Seam, SplitBy, SplitMesh, split};
-use crate::scene::{Content, Node, Scene};
+use crate::scene::{Content, Instance, Node, Scene};
 use glam::DAffine3;
 use std::collections::HashMap;
 
@@ -19,19 +19,25 @@ pub struct PreSplit {
     pub seams: Vec<(u32, u32, Seam)>,
 }
 
-/// Splits the meshes of, and below, the root group's nodes of the given names. `overlap` is as for [`split`]. Piece k
-/// of a node is called by the node's name and k. A mesh that is one piece stays as it is.
+/// Splits the meshes of, and below, the root group's nodes of the given names. Where there is no such node, a number
+/// is that of a part, if every instance is one ([`Granularity::Instances`](super::Granularity::Instances)). `overlap`
+/// is as for [`split`]. Piece k of a node is called by the node's name, or `part` and its number, and k. A mesh that is
+/// one piece stays as it is.
 ///
 /// # Errors
-/// A name that no node with a mesh of or below it has.
+/// A name that no node with a mesh of or below it has, and that is no such number.
 pub fn split_nodes(mut scene: Scene, by: &[(String, SplitBy)], overlap: f64) -> Result<PreSplit, PartsError> {
     let (mut pieces, mut seams) = (Vec::new(), Vec::new());
     let mut known: HashMap<(u32, usize), (u32, SplitMesh)> = HashMap::new();
     let root = scene.root as usize;
+    let numbered = parts_by_number(&scene);
     for (rule, (name, by)) in by.iter().enumerate() {
-        let nodes = meshes_below(&scene.groups[root].nodes, name);
+        let mut nodes = meshes_below(&scene.groups[root].nodes, name);
+        let mut called_by = name.clone();
         if nodes.is_empty() {
-            return Err(PartsError::UnknownName(name.clone()));
+            let part = name.parse().ok().and_then(|number: usize| *numbered.get(number)?);
+            nodes.push(part.ok_or_else(|| PartsError::UnknownName(name.clone()))?);
+            called_by = format!("part {name}");
         }
         for (node, mesh) in nodes {
             let (first_mesh, split) = known.entry((mesh, rule)).or_insert_with(|| {
@@ -48,7 +54,7 @@ pub fn split_nodes(mut scene: Scene, by: &[(String, SplitBy)], overlap: f64) -> 
             let nodes = &mut scene.groups[root].nodes;
             nodes[node as usize].content = Content::Nothing;
             let called = match nodes[node as usize].name.as_str() {
-                "" => name.clone(),
+                "" => called_by.clone(),
                 own => own.to_owned(),
             };
             let first = nodes.len() as u32;
@@ -78,6 +84,16 @@ fn meshes_below(nodes: &[Node], name: &str) -> Vec<(u32, u32)> {
         }
     }
     found
+}
+
+/// The node and the mesh of each part, were every instance one; `None` for parts inside of nested groups.
+fn parts_by_number(scene: &Scene) -> Vec<Option<(u32, u32)>> {
+    let seen = |instance: &Instance| !scene.meshes[instance.mesh as usize].triangles.is_empty();
+    let place = |instance: Instance| match instance.path[..] {
+        [node] => Some((node, instance.mesh)),
+        _ => None,
+    };
+    scene.instances().into_iter().filter(seen).map(place).collect()
 }
 
 impl Seam {
@@ -127,6 +143,14 @@ mod tests {
         assert_eq!(found.scene.instances().len(), 5);
         let unknown = split_nodes(strip(), &[("sea".into(), by)], 0.2).unwrap_err();
         assert_eq!(unknown, PartsError::UnknownName("sea".into()));
+        // The first node is empty: part 0 is the second, which has no name.
+        let numbered = split_nodes(strip(), &[("0".into(), by)], 0.2).unwrap();
+        assert_eq!(numbered.pieces, [3, 4, 5, 6]);
+        let nodes = &numbered.scene.root_group().nodes;
+        assert_eq!((nodes[3].name.as_str(), nodes[3].parent), ("part 0 0", Some(1)));
+        for wrong in ["2", "-1", "0.0", ""] {
+            assert!(split_nodes(strip(), &[(wrong.into(), by)], 0.2).is_err(), "{wrong}");
+        }
         let whole = SplitBy::HeightField { columns: 1, rows: 1 };
         assert!(split_nodes(strip(), &[("ground".into(), whole)], 0.2).unwrap().pieces.is_empty());
     }

@@ -28,8 +28,13 @@ use super::pairs::{Pair, Pairs};
 use super::{BroadPhase, Counters, Order, SortOptions};
 use crate::geometry::{Body, Hull, Witness, disjoint};
 use glam::{DAffine3, DVec3};
+use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
+use std::ops::Range;
+
+/// Parts whose poses are fetched at once.
+const GATHERED: usize = 64;
 
 /// Sorts parts front to back, frame after frame, and remembers what is worth remembering.
 ///
@@ -39,6 +44,8 @@ pub struct VisibilitySort {
     pub(super) options: SortOptions,
     pub(super) hulls: Vec<Hull>,
     pub(super) pieces: Vec<Piece>,
+    /// Where each piece is placed, by number, in world space.
+    placed: Vec<DAffine3>,
     pub(super) parts: Vec<PartState>,
     /// For each pair the other way round, too, with the roles said.
     known: HashMap<u64, (Known, bool), BuildHasherDefault<PairHasher>>,
@@ -47,22 +54,33 @@ pub struct VisibilitySort {
     pub(super) pairs: Pairs,
     pub(super) alive: Vec<bool>,
     search: Search,
-    pub(super) order: Order,
+    /// By seats.
+    pub(super) seated: Order,
+    /// By numbers.
+    order: Order,
+    /// Where each part is in `parts`, by number.
+    pub(super) seats: Vec<u32>,
     pub(super) counters: Counters,
     pub(super) eye: DVec3,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
+    /// Its number; where it is in the list is its seat.
+    pub(super) number: u32,
+    /// The seat of its part.
     pub(super) part: u32,
     hull: u32,
-    world_from_piece: DAffine3,
+    /// Where it was in the last sort, relative to the eye.
+    pose: DAffine3,
     /// Of a sphere around it, metres.
     radius: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PartState {
+    /// Its number; where it is in the list is its seat.
+    pub(super) number: u32,
     pub(super) first_piece: u32,
     pub(super) end_piece: u32,
     shown: bool,
@@ -77,15 +95,8 @@ pub(super) struct PartState {
     pub(super) radius: f64,
 }
 
-impl Piece {
-    #[inline]
-    fn relative_to(&self, eye: DVec3) -> DAffine3 {
-        DAffine3 { translation: self.world_from_piece.translation - eye, ..self.world_from_piece }
-    }
-}
-
 impl PartState {
-    pub(super) fn pieces(&self) -> std::ops::Range<usize> {
+    pub(super) fn pieces(&self) -> Range<usize> {
         self.first_piece as usize..self.end_piece as usize
     }
 }
@@ -134,14 +145,19 @@ impl VisibilitySort {
         for &hull in hulls {
             assert!((hull as usize) < self.hulls.len(), "hull {hull} does not exist");
             self.pieces.push(Piece {
+                number: self.pieces.len() as u32,
                 part,
                 hull,
-                world_from_piece: DAffine3::IDENTITY,
-                radius: self.hulls[hull as usize].radius(),
+                pose: DAffine3::IDENTITY,
+                radius: 0.0,
             });
+            self.placed.push(DAffine3::IDENTITY);
         }
         let end_piece = self.pieces.len() as u32;
+        // Seats are numbers where nothing has moved; what is new sits last in any case.
+        self.seats.push(part);
         self.parts.push(PartState {
+            number: part,
             first_piece,
             end_piece,
             shown: true,
@@ -166,12 +182,12 @@ impl VisibilitySort {
 
     /// Shows a part from the next frame on, or hides it. A part that is removed for good is hidden for good.
     pub fn show(&mut self, part: u32, shown: bool) {
-        self.parts[part as usize].shown = shown;
+        self.part_mut(part).shown = shown;
     }
 
     /// Says that a part is behind all others wherever the eye is, as a sky is: it comes last and occludes nothing.
     pub fn set_backdrop(&mut self, part: u32, backdrop: bool) {
-        self.parts[part as usize].backdrop = backdrop;
+        self.part_mut(part).backdrop = backdrop;
     }
 
     /// The directions of the kd-tree's extents, any number of them; it is used with
@@ -187,19 +203,24 @@ impl VisibilitySort {
 
     /// Places a piece. A pose that is not finite takes the whole part out of the order while it lasts.
     pub fn place(&mut self, piece: u32, world_from_piece: DAffine3) {
-        let piece = &mut self.pieces[piece as usize];
-        if piece.world_from_piece.matrix3 != world_from_piece.matrix3 {
-            piece.radius = self.hulls[piece.hull as usize].radius() * stretch(&world_from_piece);
-        }
-        piece.world_from_piece = world_from_piece;
+        self.placed[piece as usize] = world_from_piece;
     }
 
     /// Says what is known of two parts; the later word counts.
     pub fn know(&mut self, first: u32, second: u32, known: Known) {
         self.known.insert(pair_key(first, second), (known, true));
         self.known.insert(pair_key(second, first), (known, false));
-        self.parts[first as usize].has_known = true;
-        self.parts[second as usize].has_known = true;
+        self.part_mut(first).has_known = true;
+        self.part_mut(second).has_known = true;
+    }
+
+    fn part_mut(&mut self, number: u32) -> &mut PartState {
+        &mut self.parts[self.seats[number as usize] as usize]
+    }
+
+    /// The number of the part that sits there.
+    pub(super) fn number(&self, seat: u32) -> u32 {
+        self.parts[seat as usize].number
     }
 
     /// Sorts the parts that are shown as seen from `eye`, in every direction.
@@ -209,6 +230,9 @@ impl VisibilitySort {
     pub fn sort(&mut self, eye: DVec3) -> &Order {
         self.counters = Counters::default();
         self.eye = eye;
+        if self.options.broad_phase != BroadPhase::KdTree {
+            self.give_seats();
+        }
         self.measure();
         self.faces.build(self.options.broad_phase == BroadPhase::Grids);
         if self.options.broad_phase == BroadPhase::KdTree {
@@ -217,7 +241,7 @@ impl VisibilitySort {
         let roots = self.roots();
         self.pairs.turn(self.parts.len());
         self.search.begin(self.parts.len());
-        self.order.clear();
+        self.seated.clear();
         for part in roots {
             if self.search.index[part as usize] == 0 {
                 self.visit(part);
@@ -227,6 +251,9 @@ impl VisibilitySort {
             self.condition();
         }
         self.count();
+        self.order.clear();
+        self.order.parts.extend(self.seated.parts.iter().map(|&seat| self.parts[seat as usize].number));
+        self.order.ends.extend_from_slice(&self.seated.ends);
         &self.order
     }
 
@@ -249,31 +276,43 @@ impl VisibilitySort {
         }
         self.alive.clear();
         self.alive.resize(self.pieces.len(), false);
-        for part in &mut self.parts {
-            let pieces = &mut self.pieces[part.first_piece as usize..part.end_piece as usize];
-            part.present = part.shown && self.eye.is_finite();
-            part.present &= pieces.iter().all(|p| p.world_from_piece.is_finite());
-            if !part.present {
-                continue;
-            }
-            part.distance = f64::INFINITY;
-            if part.backdrop {
-                continue;
-            }
-            for (piece, number) in pieces.iter().zip(part.first_piece..) {
-                let hull = &self.hulls[piece.hull as usize];
-                let pose = piece.relative_to(self.eye);
-                let center = pose.transform_point3(hull.center());
-                let distance = center.length();
-                if distance < part.distance {
-                    (part.distance, part.radius) = (distance, piece.radius);
+        for from in (0..self.parts.len()).step_by(GATHERED) {
+            let end = self.parts.len().min(from + GATHERED);
+            self.gather(from..end);
+            for part in &mut self.parts[from..end] {
+                let pieces = &self.pieces[part.pieces()];
+                part.present = part.shown && self.eye.is_finite();
+                part.present &= pieces.iter().all(|p| p.pose.is_finite());
+                part.distance = f64::INFINITY;
+                if !part.present || part.backdrop {
+                    continue;
                 }
-                self.alive[number as usize] = true;
-                self.faces.add(number, hull, &pose, (center, piece.radius), self.options.slack);
-                if with_tree {
-                    self.tree.add(number, hull, &pose);
+                for (piece, seat) in pieces.iter().zip(part.first_piece..) {
+                    let hull = &self.hulls[piece.hull as usize];
+                    let center = piece.pose.transform_point3(hull.center());
+                    let distance = center.length();
+                    if distance < part.distance {
+                        (part.distance, part.radius) = (distance, piece.radius);
+                    }
+                    self.alive[seat as usize] = true;
+                    self.faces.add(seat, hull, &piece.pose, (center, piece.radius), self.options.slack);
+                    if with_tree {
+                        self.tree.add(seat, hull, &piece.pose);
+                    }
                 }
             }
+        }
+    }
+
+    /// Fetches the poses of some parts' pieces. They are anywhere in memory; loads that do not wait for each other's
+    /// use wait together.
+    fn gather(&mut self, parts: Range<usize>) {
+        let pieces =
+            self.parts[parts.start].first_piece as usize..self.parts[parts.end - 1].end_piece as usize;
+        for piece in &mut self.pieces[pieces] {
+            let placed = &self.placed[piece.number as usize];
+            piece.pose = DAffine3 { translation: placed.translation - self.eye, ..*placed };
+            piece.radius = self.hulls[piece.hull as usize].radius() * stretch(&piece.pose);
         }
     }
 
@@ -283,15 +322,14 @@ impl VisibilitySort {
         let mut is_old = vec![false; self.parts.len()];
         let mut roots = Vec::with_capacity(self.parts.len());
         if self.options.incremental {
-            for &part in self.order.parts.iter().filter(|&&part| present(part)) {
+            for &part in self.seated.parts.iter().filter(|&&part| present(part)) {
                 is_old[part as usize] = true;
                 roots.push(part);
             }
         }
         let from = roots.len();
         roots.extend((0..self.parts.len() as u32).filter(|&part| !is_old[part as usize] && present(part)));
-        let distance = |part: &u32| self.parts[*part as usize].distance;
-        roots[from..].sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        roots[from..].sort_by(|&a, &b| self.nearer(a, b));
         if self.parts.iter().any(|p| p.backdrop) {
             roots.sort_by_key(|&part| self.parts[part as usize].backdrop);
         }
@@ -356,7 +394,7 @@ impl VisibilitySort {
                 BroadPhase::KdTree if self.alive[behind as usize] => {
                     self.tree.occluders(behind, &self.alive, found);
                 }
-                _ => self.faces.occluders(behind, &self.alive, found),
+                _ => self.faces.occluders(behind, found),
             }
         }
         let (next, end) = self.pairs.close(part, start);
@@ -365,7 +403,7 @@ impl VisibilitySort {
 
     /// The component that `part` closes comes next in the order, nearest member first.
     fn put_out(&mut self, part: u32) {
-        let from = self.order.parts.len();
+        let from = self.seated.parts.len();
         loop {
             let member = self.search.open.pop().expect("a component ends with the part that opened it");
             for piece in self.parts[member as usize].pieces() {
@@ -373,15 +411,25 @@ impl VisibilitySort {
                     self.tree.deactivate(piece as u32);
                 }
                 self.alive[piece] = false;
+                self.faces.take_out(piece as u32);
             }
-            self.order.parts.push(member);
+            self.seated.parts.push(member);
             if member == part {
                 break;
             }
         }
-        let distance = |part: &u32| self.parts[*part as usize].distance;
-        self.order.parts[from..].sort_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)));
-        self.order.ends.push(self.order.parts.len() as u32);
+        if self.seated.parts.len() - from > 1 {
+            let mut group = self.seated.parts.split_off(from);
+            group.sort_by(|&a, &b| self.nearer(a, b));
+            self.seated.parts.append(&mut group);
+        }
+        self.seated.ends.push(self.seated.parts.len() as u32);
+    }
+
+    /// By the distance of the centre, then by number.
+    fn nearer(&self, a: u32, b: u32) -> Ordering {
+        let (a, b) = (&self.parts[a as usize], &self.parts[b as usize]);
+        a.distance.total_cmp(&b.distance).then(a.number.cmp(&b.number))
     }
 
     /// The exact test of a listed pair.
@@ -404,9 +452,8 @@ impl VisibilitySort {
         }
         self.counters.exact_tests += 1;
         let hull = |piece: &Piece| &self.hulls[piece.hull as usize];
-        let (front_pose, behind_pose) = (front.relative_to(self.eye), behind.relative_to(self.eye));
-        let shadow = Body { hull: hull(behind), outer_from_hull: &behind_pose, with_origin: true };
-        let body = Body { hull: hull(front), outer_from_hull: &front_pose, with_origin: false };
+        let shadow = Body { hull: hull(behind), outer_from_hull: &behind.pose, with_origin: true };
+        let body = Body { hull: hull(front), outer_from_hull: &front.pose, with_origin: false };
         let mut margin = 0.0;
         if self.options.slack > 0.0 {
             let far = |body: &Body, radius: f64| body.center().length() + radius;
@@ -421,27 +468,28 @@ impl VisibilitySort {
         if !self.parts[front as usize].has_known {
             return None;
         }
-        let &(known, first) = self.known.get(&pair_key(front, behind))?;
+        let &(known, first) = self.known.get(&pair_key(self.number(front), self.number(behind)))?;
         Some(known.says(self.eye, first))
     }
 
     /// Whether two pieces intersect, wherever the eye is.
     pub(super) fn intersect(&self, a: u32, b: u32) -> bool {
-        let pose = |piece: u32| self.pieces[piece as usize].relative_to(self.eye);
-        let hull = |piece: u32| &self.hulls[self.pieces[piece as usize].hull as usize];
-        let body = |piece, pose| Body { hull: hull(piece), outer_from_hull: pose, with_origin: false };
-        !disjoint(&body(a, &pose(a)), &body(b, &pose(b)), &mut Witness::default(), 0.0)
+        let body = |piece: u32| {
+            let piece = &self.pieces[piece as usize];
+            Body { hull: &self.hulls[piece.hull as usize], outer_from_hull: &piece.pose, with_origin: false }
+        };
+        !disjoint(&body(a), &body(b), &mut Witness::default(), 0.0)
     }
 
     fn count(&mut self) {
         let (cells, entries) = self.faces.size();
         let counters = &mut self.counters;
-        counters.parts = self.order.parts.len() as u64;
+        counters.parts = self.seated.parts.len() as u64;
         counters.extents = self.faces.records.len() as u64;
         counters.cells = cells as u64;
         counters.cell_entries = entries as u64;
         counters.candidates = self.pairs.pairs.len() as u64;
-        let sizes = self.order.groups().map(|g| g.len() as u64).filter(|&n| n > 1);
+        let sizes = self.seated.groups().map(|g| g.len() as u64).filter(|&n| n > 1);
         for size in sizes {
             counters.groups += 1;
             counters.grouped_parts += size;

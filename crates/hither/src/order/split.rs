@@ -159,7 +159,8 @@ fn clipped(faces: &[Face], normal: DVec3, offset: f64) -> Vec<Face> {
 fn between(a: &Corner, b: &Corner, t: f32) -> Corner {
     Corner {
         position: a.position.lerp(b.position, t),
-        normal: a.normal.lerp(b.normal, t).normalize_or(a.normal),
+        // Not unit: so it is interpolated as if the triangle were whole.
+        normal: a.normal.lerp(b.normal, t),
         uv: a.uv.lerp(b.uv, t),
         color: a.color.lerp(b.color, t),
     }

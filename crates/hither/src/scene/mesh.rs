@@ -12,7 +12,8 @@ pub struct Mesh {
     pub name: String,
     /// Vertex positions, all finite.
     pub positions: Vec<Vec3>,
-    /// Vertex normals for smooth shading, or empty (then faces are flat).
+    /// Vertex normals for smooth shading, or empty (then faces are flat). They are interpolated as they are: unit, but
+    /// where a triangle was cut, and zero where there is none.
     pub normals: Vec<Vec3>,
     /// Texture coordinates, v down as in glTF, or empty.
     pub uvs: Vec<Vec2>,

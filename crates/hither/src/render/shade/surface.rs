@@ -99,7 +99,7 @@ pub(in crate::render) struct SeenTriangle<'a> {
     face_normal: DVec3,
     /// Light around the face's normal.
     face_light: Vec3,
-    /// Unit, on the eye's side of the face taken together, in view space.
+    /// On the eye's side of the face taken together, in view space; of lengths that are right relative to each other.
     vertex_normals: Option<[DVec3; 3]>,
 }
 
@@ -157,14 +157,15 @@ fn vertex_normals(scene: &Scene, placed: &Placed, triangle: u32, face_normal: DV
     }
     let to_view = placed.normals_to_view();
     let corners = mesh.triangles[triangle as usize];
-    let normals = corners.map(|v| (to_view * mesh.normals[v as usize].as_dvec3()).normalize_or_zero());
+    let normals = corners.map(|v| to_view * mesh.normals[v as usize].as_dvec3());
     // Back faces, mirrors and files with inward normals all come out right: taken together, the normals
     // point to the side from which the face is seen.
     let together = (normals[0] + normals[1] + normals[2]).dot(face_normal);
     if together == 0.0 {
         return None;
     }
-    Some(normals.map(|n| if n == DVec3::ZERO { face_normal } else { n * together.signum() }))
+    let longest = normals.iter().map(|n| n.length()).fold(0.0, f64::max);
+    Some(normals.map(|n| if n == DVec3::ZERO { face_normal * longest } else { n * together.signum() }))
 }
 
 /// The instances among `ids`, for [`PlacedInstances::look_up`]: neighbours that repeat are left out.
