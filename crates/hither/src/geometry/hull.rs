@@ -370,6 +370,9 @@ impl Hull {
             Some((normal, normal.dot(corner(a))))
         });
         let planes: Vec<(DVec3, f64)> = planes.collect();
+        if planes.is_empty() {
+            return false;
+        }
         let checked: Vec<DVec3> = if points.len() * planes.len() <= MOST_CHECKS {
             if points.iter().any(|&p| planes.iter().any(|&(n, d)| n.dot(p) > d + tolerance)) {
                 return false;

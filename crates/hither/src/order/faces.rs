@@ -469,7 +469,7 @@ mod tests {
             }).collect();
             let hull = Hull::around(&points).unwrap();
             prop_assert_eq!(round, hull.roundness() < ROUND);
-            let turn = glam::DQuat::from_vec4(glam::DVec4::from(turn)).normalize();
+            let turn = glam::DVec4::from(turn).try_normalize().map_or(glam::DQuat::IDENTITY, glam::DQuat::from_vec4);
             let pose = DAffine3::from_rotation_translation(turn, DVec3::from(center) * away);
             let mut faces = Faces::default();
             faces.clear(1);

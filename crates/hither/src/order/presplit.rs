@@ -32,7 +32,10 @@ pub fn split_nodes(mut scene: Scene, by: &[(String, SplitBy)], overlap: f64) -> 
     let root = scene.root as usize;
     let numbered = parts_by_number(&scene);
     for (rule, (name, by)) in by.iter().enumerate() {
-        let mut nodes = meshes_below(&scene.groups[root].nodes, name);
+        let mut nodes = Vec::new();
+        if !name.is_empty() {
+            nodes = meshes_below(&scene.groups[root].nodes, name);
+        }
         let mut called_by = name.clone();
         if nodes.is_empty() {
             let part = name.parse().ok().and_then(|number: usize| *numbered.get(number)?);
