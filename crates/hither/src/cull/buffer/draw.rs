@@ -3,6 +3,7 @@
 use super::Drawn;
 use super::ask::{BoxView, project};
 use super::clip::{self, Clipped, EdgeOf, clip, doubled_area};
+use super::convex::{self, Bounds};
 use super::fill::{Corner, Joint, Outline, fill, first_pixel, last_pixel};
 use super::loose::{LooseFaces, Sixteen, fill_one, set_up};
 use super::mosaic::{Area, Drawing, Mosaic};
@@ -29,6 +30,7 @@ pub(in crate::cull) struct Band {
     beyond: Vec<u8>,
     loose: Box<Sixteen>,
     mosaic: Mosaic,
+    bounds: Bounds,
     open: BinaryHeap<Open>,
 }
 
@@ -97,6 +99,7 @@ impl Band {
             beyond: vec![],
             loose: Box::default(),
             mosaic: Mosaic::default(),
+            bounds: Bounds::default(),
             open: BinaryHeap::new(),
         }
     }
@@ -272,6 +275,19 @@ impl Band {
         };
         let Some(placing) = Placing::new(&standing.at, &standing.sizes, least_w) else { return };
         let plain = standing.plain || standing.margin.is_some() || !clear;
+        if let (false, Some(body)) = (plain, patch.convex) {
+            placing.place(simd, &standing.occluder.vertices, patch, &mut self.placed);
+            let drawing = convex::Drawing {
+                body: &standing.occluder.convex[body as usize],
+                placed: &self.placed,
+                eye: standing.eye,
+                front_sign: standing.at.front_sign as i32,
+                slack: placing.slack,
+            };
+            drawn.patches += 1;
+            drawn.faces += convex::draw(simd, &mut self.surface, &mut self.bounds, &drawing);
+            return;
+        }
         if let (false, Some(fine)) = (plain, &patch.fine)
             && is_fine(rect, patch.faces as usize, PX_A_FINE_FACE)
             && let Some(rect) = self.rows_of(rect)

@@ -97,7 +97,7 @@ impl FineFaces {
 
 /// The plane of a face: by its diagonals, or two sides, the cross product is the normal. Its rounding only decides
 /// between front and back where a face is seen edge-on.
-fn plane_of(face: &Face, vertices: &Vertices, first: u32) -> [f32; 4] {
+pub(super) fn plane_of(face: &Face, vertices: &Vertices, first: u32) -> [f32; 4] {
     let at = |k: usize| {
         let v = (first + face.corner[k]) as usize;
         glam::DVec3::new(vertices.x[v].into(), vertices.y[v].into(), vertices.z[v].into())

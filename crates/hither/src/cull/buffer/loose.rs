@@ -448,7 +448,9 @@ fn fill_tiles<S: Simd>(
         if meets == 0xFFFF && (from.simd_le(x_first) & to.simd_ge(x_last)).all_true() {
             surface.cover(simd, tile, over);
         } else {
-            surface.raise_spans(simd, tile, [*from - x_first, *to - x_first], meets, over, highest);
+            let depths = over.rows(simd);
+            let depth = |row: usize| depths.row(simd, row);
+            surface.raise_spans(simd, tile, [*from - x_first, *to - x_first], meets, depth, highest);
         }
     }
 }

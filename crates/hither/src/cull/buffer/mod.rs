@@ -70,6 +70,7 @@
 
 mod ask;
 mod clip;
+mod convex;
 mod draw;
 mod fill;
 mod fine;

@@ -11,6 +11,7 @@
 //! Any triangles will do: open, closed, non-manifold, degenerate. What is paired decides only how *tight* the
 //! coverage is; that it is never too large is proved in [`super`] for every pairing.
 
+use super::convex::ConvexBody;
 use super::fine::{Fine, FineFaces};
 use super::loose::LooseFaces;
 use crate::index::{Box3, WideTree, tree_of_boxes};
@@ -55,6 +56,7 @@ pub struct Occluder {
     pub(super) loose_of_node: Vec<Option<u32>>,
     pub(super) loose: Vec<LooseFaces>,
     pub(super) fine: FineFaces,
+    pub(super) convex: Vec<ConvexBody>,
     triangles: usize,
 }
 
@@ -76,6 +78,8 @@ pub(super) struct Patch {
     pub faces: u32,
     /// Where it lies among the fine patches, if it has many faces.
     pub fine: Option<Fine>,
+    /// Its place among the convex bodies, if it is one of few faces.
+    pub convex: Option<u32>,
     pub bounds: Box3,
 }
 
@@ -161,6 +165,7 @@ impl Occluder {
             + size_of_val(self.loose_of_node.as_slice())
             + size_of_val(self.loose.as_slice())
             + self.fine.memory_bytes()
+            + size_of_val(self.convex.as_slice())
     }
 }
 
@@ -339,6 +344,11 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
         while !occluder.vertices.x.len().is_multiple_of(8) {
             occluder.vertices.repeat_last();
         }
+        let body = ConvexBody::new(&occluder.faces[first_face as usize..], &occluder.vertices, first_vertex);
+        let convex = body.map(|body| {
+            occluder.convex.push(body);
+            occluder.convex.len() as u32 - 1
+        });
         occluder.patches.push(Patch {
             first_vertex,
             vertices: occluder.vertices.x.len() as u32 - first_vertex,
@@ -349,6 +359,7 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
                 &occluder.vertices,
                 first_vertex,
             ),
+            convex,
             bounds,
         });
         boxes.push(bounds);

@@ -17,7 +17,7 @@ pub(super) struct TilePlane {
 }
 
 impl TilePlane {
-    const ZERO: TilePlane = TilePlane { origin: 0.0, per_column: 0.0, per_row: 0.0 };
+    pub const ZERO: TilePlane = TilePlane { origin: 0.0, per_column: 0.0, per_row: 0.0 };
 
     #[inline(always)]
     pub fn at(&self, column: i32, row: i32) -> f32 {
@@ -31,7 +31,7 @@ impl TilePlane {
 
     /// The same for all rows.
     #[inline(always)]
-    fn rows<S: Simd>(&self, simd: S) -> PlaneRows<S> {
+    pub fn rows<S: Simd>(&self, simd: S) -> PlaneRows<S> {
         let columns = f32x16::from_slice(simd, &COLUMNS);
         PlaneRows { column: columns * self.per_column, origin: (columns * self.per_row + self.origin).into() }
     }
@@ -63,14 +63,14 @@ impl TilePlane {
 }
 
 /// A plane over a tile, row by row: the bits of [`TilePlane::row`].
-struct PlaneRows<S: Simd> {
+pub(super) struct PlaneRows<S: Simd> {
     column: f32x16<S>,
     origin: [f32; 16],
 }
 
 impl<S: Simd> PlaneRows<S> {
     #[inline(always)]
-    fn row(&self, _simd: S, row: usize) -> f32x16<S> {
+    pub fn row(&self, _simd: S, row: usize) -> f32x16<S> {
         self.column + self.origin[row]
     }
 }
@@ -300,7 +300,7 @@ impl Surface {
     }
 
     /// Raises the pixels of a tile that lie in spans of its rows: first and last column. `rows` are those whose
-    /// span is not empty. No depth is above `highest`.
+    /// span is not empty. `depth` says a row's; none is above `highest`.
     #[inline(always)]
     pub fn raise_spans<S: Simd>(
         &mut self,
@@ -308,7 +308,7 @@ impl Surface {
         tile: usize,
         [from, to]: [f32x16<S>; 2],
         rows: u32,
-        plane: TilePlane,
+        depth: impl Fn(usize) -> f32x16<S>,
         highest: f32,
     ) {
         let fresh = self.kind[tile] == Kind::Empty && !self.is_at_border(tile);
@@ -319,7 +319,6 @@ impl Surface {
         }
         let (from, to): ([f32; 16], [f32; 16]) = (from.into(), to.into());
         let columns = f32x16::from_slice(simd, &COLUMNS);
-        let depths = plane.rows(simd);
         let (first, last) =
             (rows.trailing_zeros() as usize & 15, (31 - (rows | 1).leading_zeros() as usize) & 15);
         let all = &mut self.rows[tile * 16..][..16];
@@ -332,7 +331,7 @@ impl Surface {
                 let mut new = old;
                 if at >= first && at <= last {
                     let covered = columns.simd_ge(from[at]) & columns.simd_le(to[at]);
-                    new = covered.select(old.max(depths.row(simd, at)), old);
+                    new = covered.select(old.max(depth(at)), old);
                     new.store_slice(&mut row.0);
                 } else if fresh {
                     zero.store_slice(&mut row.0);
@@ -615,7 +614,9 @@ mod tests {
                 1 => {
                     let from = f32x16::splat(simd, random.below(16) as f32);
                     let to = f32x16::splat(simd, random.below(16) as f32);
-                    surface.raise_spans(simd, tile, [from, to], 1 + random.below(0xFFFF), plane, plane.max());
+                    let depths = plane.rows(simd);
+                    let (rows, depth) = (1 + random.below(0xFFFF), |row: usize| depths.row(simd, row));
+                    surface.raise_spans(simd, tile, [from, to], rows, depth, plane.max());
                 }
                 _ => {
                     surface.open(simd, tile);

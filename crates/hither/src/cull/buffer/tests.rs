@@ -231,6 +231,92 @@ fn counting_outlines_and_counting_faces_cover_the_same_pixels() {
     assert!(both > 200_000 && differ < both, "{both} pixels, {one} covered in one alone, {nearer} nearer");
 }
 
+/// Closed convex bodies of few faces, of all shapes and sizes, mirrored or not, some seen from both sides.
+fn bodies(seed: u64) -> (Scene, View) {
+    let random = &mut Random::new(seed);
+    let mut scene = Scene::new("bodies");
+    scene.materials = vec![Material { double_sided: random.one_in(4), ..Material::default() }];
+    for _ in 0..1 + random.below(8) {
+        // A prism, a frustum or a pyramid over a polygon, closed; a corner may be a little off.
+        let n = 3 + random.below(4);
+        let top = [1.0, 1.0, 0.4, 0.0][random.below(4) as usize];
+        let mut mesh = Mesh::default();
+        for level in 0..2u32 {
+            let r = if level == 0 { 1.0 } else { top };
+            for k in 0..n {
+                let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(n)).sin_cos();
+                mesh.positions.push(DVec3::new(cos * r, sin * r, f64::from(level) * 2.0 - 1.0).as_vec3());
+            }
+        }
+        for k in 0..n {
+            let next = (k + 1) % n;
+            mesh.triangles.extend([[k, next, n + next], [k, n + next, n + k]]);
+            if k > 1 {
+                mesh.triangles.extend([[0, k, k - 1], [n, n + k - 1, n + k]]);
+            }
+        }
+        if random.one_in(8) {
+            mesh.positions[0].x += random.between(-0.5, 0.5) as f32;
+        }
+        mesh.primitives = vec![Primitive { triangles: 0..mesh.triangles.len() as u32, material: Some(0) }];
+        scene.meshes.push(mesh);
+        let at = DVec3::new(random.between(-3.0, 3.0), random.between(-3.0, 3.0), random.between(-3.0, 3.0));
+        let mut size = || [0.003, 0.05, 0.5, 2.0][random.below(4) as usize];
+        let scale = DVec3::new(size(), size(), size()) * [1.0, -1.0][random.below(2) as usize];
+        let axis = DVec3::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0), 0.3).normalize();
+        let rotation = match random.below(3) {
+            0 => glam::DQuat::IDENTITY,
+            _ => glam::DQuat::from_axis_angle(axis, random.between(0.0, 6.3)),
+        };
+        let local = Transform::Trs { translation: at, rotation, scale };
+        let content = Content::Mesh(scene.meshes.len() as u32 - 1);
+        scene.groups[0].push(Node { content, local, ..Node::default() });
+    }
+    let size = (1 + random.below(120), 1 + random.below(120));
+    let reach = [3.0, 6.0, 30.0, 1.0][random.below(4) as usize];
+    let mut view = around(random, reach, size);
+    if random.one_in(3) {
+        view.projection =
+            Projection::Orthographic { half_height: random.between(1.0, 6.0), near: 0.05, far: 50.0 };
+    }
+    (scene, view)
+}
+
+#[test]
+fn no_pixel_holds_more_than_is_there_on_convex_bodies() {
+    let random = &mut Random::new(21);
+    let (mut covered, mut shot) = (0, 0);
+    for seed in 0..3000 {
+        let (scene, view) = bodies(seed);
+        let (c, s) = attack(&scene, &view, random, 4, &format!("seed {seed}"));
+        covered += c;
+        shot += s;
+    }
+    assert!(covered > 200_000 && shot > 800_000, "{covered} pixels, {shot} rays");
+}
+
+#[test]
+fn convex_bodies_cover_what_their_faces_cover() {
+    let (mut both, mut one, mut nearer, mut farther) = (0u32, 0u32, 0u32, 0u32);
+    for seed in 0..1500 {
+        let (scene, view) = bodies(seed);
+        let fast = drawn(&scene, &view, &OcclusionOptions::default()).depths();
+        let plain = drawn_plainly(&scene, &view).depths();
+        for (fast, plain) in fast.iter().zip(&plain) {
+            both += u32::from(*fast > 0.0 && *plain > 0.0);
+            one += u32::from((*fast > 0.0) != (*plain > 0.0));
+            nearer += u32::from(*plain > 0.0 && *fast > plain * 1.000_1);
+            farther += u32::from(*fast > 0.0 && *fast < plain * 0.99);
+        }
+    }
+    // A plane, lowered by what it falls within half a pixel, is below its neighbour's for about a pixel beyond their edge.
+    let differ = (one.max(nearer) * 100).max(farther * 50);
+    assert!(
+        both > 200_000 && differ < both,
+        "{both} pixels, {one} covered in one alone, {nearer} nearer, {farther} farther"
+    );
+}
+
 #[test]
 fn edges_inside_a_surface_do_not_leak() {
     let random = &mut Random::new(3);
