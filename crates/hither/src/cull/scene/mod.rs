@@ -37,13 +37,17 @@ pub struct CullOptions {
     pub objects_move: f64,
     /// Where an instance must show. Sampled, with nothing that moves.
     pub meaning: Meaning,
-    /// Instances whose boxes cover fewer pixels than this are not drawn as occluders. Smaller hides more, and
+    /// Occluders are drawn, and boxes asked about, at so many of the view's pixels across and down a pixel: 1, 2, 4 or
+    /// any other number. The answer is as true, whatever it is; more cost less, and leave out less, above all of what
+    /// is seen through gaps of a few pixels. 1 if sampled: centres are those of the view's pixels.
+    pub coarseness: u32,
+    /// Instances whose boxes cover fewer pixels of the view than this are not drawn as occluders. Smaller hides more, and
     /// costs more.
     pub least_occluder_px: u32,
-    /// Connected pieces of an occluder that touch fewer pixels across or down are left out.
+    /// Connected pieces of an occluder that touch fewer pixels of the view across or down are left out.
     pub least_piece_px: u32,
-    /// So are pieces whose boxes cover fewer pixels than this for each of their faces: they cost more than they
-    /// hide.
+    /// So are pieces whose boxes cover fewer pixels of the view than this for each of their faces: they cost more than
+    /// they hide.
     pub least_px_a_face: u32,
     /// Boxes of a mesh's own tree that are asked about before an instance counts as visible.
     pub boxes_an_instance: u32,
@@ -65,6 +69,7 @@ impl Default for CullOptions {
             eye_moves: 0.0,
             objects_move: 0.0,
             meaning: Meaning::Continuous,
+            coarseness: 1,
             least_occluder_px: 400,
             least_piece_px: 6,
             least_px_a_face: 4,
@@ -210,7 +215,7 @@ impl Culler {
             objects_move: options.objects_move,
             level: options.level,
         };
-        let frame = |view| Frame::new(view, &choice)?.meaning(options.meaning);
+        let frame = |view| Frame::new(view, &choice)?.meaning(options.meaning)?.coarser(options.coarseness);
         let frames: Vec<Frame> = views.iter().map(frame).collect::<Result<_, _>>()?;
         self.prepare(index);
         self.views.resize_with(views.len(), OneView::default);
