@@ -4,9 +4,13 @@
 //! draw what hid something last time, what hid most first
 //! walk the index nearest first:
 //!     a box that the buffer hides, or that is outside: drop it, with all that is in it
+//!     a box that is too small to hold an occluder: put it aside
 //!     an instance: if one of the boxes of its mesh's tree shows, it may be seen;
 //!                  if it is large enough, draw its opaque surfaces at once, so that they hide what is behind
-//! ask once more about all that may be seen, now that everything is drawn
+//! now that everything is drawn:
+//!     ask once more about all that may be seen
+//!     walk what was put aside, depth first, in the same way; nothing of it is drawn or asked about again
+//! sort what may be seen by depth
 //! ```
 //!
 //! *Occluders* are chosen by size on the screen: an instance is drawn if its box covers so many pixels, and of
@@ -16,7 +20,14 @@
 //! is switched off costs nothing but its place in the index.
 //!
 //! The verdicts are those of the conservative buffer: an instance that is left out shows at no point of the
-//! continuous image; or, with [`Meaning::Sampled`], at no pixel's centre.
+//! continuous image; or, with [`Meaning::Sampled`], at no pixel's centre. As the former holds at every resolution, the
+//! buffer's pixels may be coarser than the view's ([`CullOptions::coarseness`]).
+//!
+//! *Tried, and not kept.* Occluders by the area-angle of their surfaces [Coorg & Teller 1996], summed over each mesh for
+//! the three axes, against that of the box around it, instead of by the box alone: 2 to 7 % fewer faces at 0.6 % more
+//! instances found in a market of 22,000 parts, and nothing in an office of open modules, of which each covers as much
+//! as the threshold asks. Lists of what the walk needs of instances, apart from their transforms, and no look inside
+//! meshes of a single box: no difference beyond what one run differs from the next.
 
 mod walk;
 
