@@ -1,7 +1,7 @@
 //! Culls a file or a world from each of its cameras: time, instances found, instances truly seen.
 //!
 //! ```sh
-//! cargo run --release -p hither-bench --example cull_scene -- FILE|world:SPEC WIDTH HEIGHT [sampled] [coherence]
+//! cargo run --release -p hither-bench --example cull_scene -- FILE|world:SPEC WIDTH HEIGHT [sampled] [coherence] [coarse=N]
 //! ```
 //!
 //! *Seen* are the instances that are nearest at a pixel's centre, and at one of 4×4 samples a pixel.
@@ -25,7 +25,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let sampled = arguments.iter().any(|a| a == "sampled");
     let meaning = if sampled { Meaning::Sampled } else { Meaning::Continuous };
     let coherence = arguments.iter().any(|a| a == "coherence");
-    let options = CullOptions { meaning, coherence, ..CullOptions::default() };
+    let coarse = arguments.iter().find_map(|a| a.strip_prefix("coarse=")).map_or(Ok(1), str::parse)?;
+    let options = CullOptions { meaning, coherence, coarseness: coarse, ..CullOptions::default() };
     let index = SceneIndex::build(scene, &IndexOptions::default());
     let mut culler = Culler::new();
     culler.prepare(&index);

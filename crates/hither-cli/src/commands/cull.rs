@@ -36,6 +36,9 @@ pub struct Arguments {
     /// Leave out what shows at no pixel's centre, too: for drawing at this very size (method buffer)
     #[arg(long)]
     sampled: bool,
+    /// Cull with pixels N times as wide and high: as true, faster, and leaves out less (method buffer)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64), default_value = "1")]
+    coarse: u32,
     /// Start each frame with what hid something in the last (method buffer)
     #[arg(long)]
     coherence: bool,
@@ -115,6 +118,12 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
     if !buffer && (arguments.reasons || arguments.coherence) {
         return Err(Failure::usage("--reasons and --coherence go with --method buffer"));
     }
+    if !buffer && arguments.coarse > 1 {
+        return Err(Failure::usage("--coarse goes with --method buffer"));
+    }
+    if arguments.sampled && arguments.coarse > 1 {
+        return Err(Failure::usage("--sampled needs the view's own pixels: it goes without --coarse"));
+    }
     if !buffer && (arguments.sampled || arguments.objects_move > 0.0) {
         return Err(Failure::usage("--sampled and --objects-move go with --method buffer"));
     }
@@ -148,6 +157,7 @@ impl Method {
                     eye_moves: arguments.margin,
                     objects_move: arguments.objects_move,
                     meaning: if arguments.sampled { Meaning::Sampled } else { Meaning::Continuous },
+                    coarseness: arguments.coarse,
                     coherence: arguments.coherence,
                     reasons: arguments.reasons,
                     ..CullOptions::default()
@@ -241,6 +251,7 @@ fn settings(arguments: &Arguments, eye: &Eye, index: &SceneIndex) -> Map<String,
     map.insert("margin".into(), arguments.margin.into());
     map.insert("objects_move".into(), arguments.objects_move.into());
     map.insert("sampled".into(), arguments.sampled.into());
+    map.insert("coarse".into(), arguments.coarse.into());
     map
 }
 

@@ -157,6 +157,8 @@ pub(super) struct Frame {
     /// What boxes are asked about.
     pub meaning: Meaning,
     pub screen_from_world: ScreenFromObject,
+    /// Pixels that a metre at distance 1 covers anywhere in the image.
+    pixels_a_metre: f64,
 }
 
 impl Frame {
@@ -167,7 +169,14 @@ impl Frame {
             return Err(ViewError::Camera("what moves must move by a finite distance that is not negative"));
         }
         let screen_from_world = ScreenFromObject::of_view(view);
-        Ok(Frame { view: *view, options: *options, meaning: Meaning::Continuous, screen_from_world })
+        let pixels_a_metre = pixels_a_metre(view, 0);
+        Ok(Frame {
+            view: *view,
+            options: *options,
+            meaning: Meaning::Continuous,
+            screen_from_world,
+            pixels_a_metre,
+        })
     }
 
     /// The same, asked with another meaning. Samples stay where they are only as long as nothing moves.
@@ -178,22 +187,35 @@ impl Frame {
         Ok(Frame { meaning, ..self })
     }
 
-    /// Pixels a metre at distance 1 covers anywhere in the image.
-    fn pixels_a_metre(&self) -> f64 {
-        let scale = self.view.pixels_per_unit();
-        match self.view.projection {
-            Projection::Orthographic { .. } => scale,
-            Projection::Perspective { .. } => {
-                let half = f64::from(self.view.width.max(self.view.height)) * 0.5 / scale;
-                // Both directions across the image, and along the ray.
-                scale * (1.0 + half * half).sqrt()
-            }
+    /// The same with pixels `n` times as wide and as high. They are counted from the image's top left corner, so
+    /// that each is a square of n×n of the view's, and what is seen is the same at the same place; at the right and at
+    /// the bottom the last may reach beyond the view. So this shows all that the view shows, and what it calls hidden or
+    /// outside is so in the view: nothing that is promised depends on the size of pixels. Boxes may be asked about,
+    /// and nothing else: `view` keeps the projection of the whole.
+    pub(in crate::cull) fn coarser(mut self, n: u32) -> Result<Frame, ViewError> {
+        if n == 1 {
+            return Ok(self);
         }
+        if n == 0 {
+            return Err(ViewError::Camera(
+                "the pixels of what culls must be at least as large as the view's",
+            ));
+        }
+        if self.meaning == Meaning::Sampled {
+            return Err(ViewError::Camera("what is sampled needs the view's own pixels, not coarser ones"));
+        }
+        self.pixels_a_metre = pixels_a_metre(&self.view, n - 1) / f64::from(n);
+        // Rounded once more where n is no power of two: 2⁻⁵³ of each term, as any matrix on the way here.
+        for row in [&mut self.screen_from_world.x, &mut self.screen_from_world.y] {
+            *row = row.map(|c| c / f64::from(n));
+        }
+        (self.view.width, self.view.height) = (self.view.width.div_ceil(n), self.view.height.div_ceil(n));
+        Ok(self)
     }
 
     pub(super) fn margin(&self) -> Option<(f64, f64)> {
         let metres = self.options.eye_moves + self.options.objects_move;
-        (metres > 0.0).then(|| (metres, self.pixels_a_metre()))
+        (metres > 0.0).then_some((metres, self.pixels_a_metre))
     }
 
     fn standing<'a>(&self, occluder: &'a Occluder, world_from_object: &DAffine3) -> Standing<'a> {
@@ -217,6 +239,20 @@ impl Frame {
             least_px,
             px_a_face: 0,
             plain: false,
+        }
+    }
+}
+
+/// Pixels that a metre at distance 1 covers anywhere in an image that goes on for `beyond` pixels at the right and at
+/// the bottom.
+fn pixels_a_metre(view: &View, beyond: u32) -> f64 {
+    let scale = view.pixels_per_unit();
+    match view.projection {
+        Projection::Orthographic { .. } => scale,
+        Projection::Perspective { .. } => {
+            let half = (f64::from(view.width.max(view.height)) * 0.5 + f64::from(beyond)) / scale;
+            // Both directions across the image, and along the ray.
+            scale * (1.0 + half * half).sqrt()
         }
     }
 }

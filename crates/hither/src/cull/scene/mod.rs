@@ -4,9 +4,13 @@
 //! draw what hid something last time, what hid most first
 //! walk the index nearest first:
 //!     a box that the buffer hides, or that is outside: drop it, with all that is in it
+//!     a box that is too small to hold an occluder: put it aside
 //!     an instance: if one of the boxes of its mesh's tree shows, it may be seen;
 //!                  if it is large enough, draw its opaque surfaces at once, so that they hide what is behind
-//! ask once more about all that may be seen, now that everything is drawn
+//! now that everything is drawn:
+//!     ask once more about all that may be seen
+//!     walk what was put aside, depth first, in the same way; nothing of it is drawn or asked about again
+//! sort what may be seen by depth
 //! ```
 //!
 //! *Occluders* are chosen by size on the screen: an instance is drawn if its box covers so many pixels, and of
@@ -16,7 +20,14 @@
 //! is switched off costs nothing but its place in the index.
 //!
 //! The verdicts are those of the conservative buffer: an instance that is left out shows at no point of the
-//! continuous image; or, with [`Meaning::Sampled`], at no pixel's centre.
+//! continuous image; or, with [`Meaning::Sampled`], at no pixel's centre. As the former holds at every resolution, the
+//! buffer's pixels may be coarser than the view's ([`CullOptions::coarseness`]).
+//!
+//! *Tried, and not kept.* Occluders by the area-angle of their surfaces [Coorg & Teller 1996], summed over each mesh for
+//! the three axes, against that of the box around it, instead of by the box alone: 2 to 7 % fewer faces at 0.6 % more
+//! instances found in a market of 22,000 parts, and nothing in an office of open modules, of which each covers as much
+//! as the threshold asks. Lists of what the walk needs of instances, apart from their transforms, and no look inside
+//! meshes of a single box: no difference beyond what one run differs from the next.
 
 mod walk;
 
@@ -37,13 +48,17 @@ pub struct CullOptions {
     pub objects_move: f64,
     /// Where an instance must show. Sampled, with nothing that moves.
     pub meaning: Meaning,
-    /// Instances whose boxes cover fewer pixels than this are not drawn as occluders. Smaller hides more, and
+    /// Occluders are drawn, and boxes asked about, at so many of the view's pixels across and down a pixel: 1, 2, 4 or
+    /// any other number. The answer is as true, whatever it is; more cost less, and leave out less, above all of what
+    /// is seen through gaps of a few pixels. 1 if sampled: centres are those of the view's pixels.
+    pub coarseness: u32,
+    /// Instances whose boxes cover fewer pixels of the view than this are not drawn as occluders. Smaller hides more, and
     /// costs more.
     pub least_occluder_px: u32,
-    /// Connected pieces of an occluder that touch fewer pixels across or down are left out.
+    /// Connected pieces of an occluder that touch fewer pixels of the view across or down are left out.
     pub least_piece_px: u32,
-    /// So are pieces whose boxes cover fewer pixels than this for each of their faces: they cost more than they
-    /// hide.
+    /// So are pieces whose boxes cover fewer pixels of the view than this for each of their faces: they cost more than
+    /// they hide.
     pub least_px_a_face: u32,
     /// Boxes of a mesh's own tree that are asked about before an instance counts as visible.
     pub boxes_an_instance: u32,
@@ -65,6 +80,7 @@ impl Default for CullOptions {
             eye_moves: 0.0,
             objects_move: 0.0,
             meaning: Meaning::Continuous,
+            coarseness: 1,
             least_occluder_px: 400,
             least_piece_px: 6,
             least_px_a_face: 4,
@@ -210,7 +226,7 @@ impl Culler {
             objects_move: options.objects_move,
             level: options.level,
         };
-        let frame = |view| Frame::new(view, &choice)?.meaning(options.meaning);
+        let frame = |view| Frame::new(view, &choice)?.meaning(options.meaning)?.coarser(options.coarseness);
         let frames: Vec<Frame> = views.iter().map(frame).collect::<Result<_, _>>()?;
         self.prepare(index);
         self.views.resize_with(views.len(), OneView::default);

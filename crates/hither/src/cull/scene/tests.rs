@@ -74,6 +74,50 @@ fn what_shows_at_a_pixel_centre_is_never_left_out_when_sampled() {
 }
 
 #[test]
+fn what_shows_is_never_left_out_at_any_coarseness() {
+    let mut culler = Culler::new();
+    let mut left_out = [0; 2];
+    for seed in 0..400 {
+        let index = SceneIndex::build(trouble::scene(seed), &IndexOptions::default());
+        let random = &mut trouble::Random::new(seed);
+        // Sizes that a pixel of several does not divide.
+        let view =
+            View { width: 30 + random.below(60), height: 20 + random.below(50), ..trouble::view(seed) };
+        let shown = shown(&index, &view);
+        for (k, coarseness) in [1, [2, 3, 4, 7, 100][random.below(5) as usize]].into_iter().enumerate() {
+            let least = [0, 40, 400][random.below(3) as usize];
+            let options = CullOptions {
+                coarseness,
+                least_occluder_px: least,
+                least_piece_px: 0,
+                reasons: true,
+                ..CullOptions::default()
+            };
+            let found = culler.cull(&index, &view, &options).unwrap();
+            let visible: HashSet<u32> = found.visible.iter().copied().collect();
+            assert!(
+                shown.is_subset(&visible),
+                "seed {seed}, coarseness {coarseness}: {shown:?} show, {visible:?} were found"
+            );
+            every_instance_is_judged_once(&index, &found);
+            left_out[k] += index.scene().instance_count() as usize - visible.len();
+        }
+    }
+    assert!(left_out[0] > left_out[1] && left_out[1] > 50, "{left_out:?}");
+}
+
+#[test]
+fn coarse_pixels_are_refused_where_they_have_no_meaning() {
+    let index = SceneIndex::build(trouble::scene(1), &IndexOptions::default());
+    let sampled = CullOptions { meaning: Meaning::Sampled, coarseness: 2, ..CullOptions::default() };
+    assert!(cull(&index, &trouble::view(1), &sampled).is_err());
+    let none = CullOptions { coarseness: 0, ..CullOptions::default() };
+    assert!(cull(&index, &trouble::view(1), &none).is_err());
+    let huge = CullOptions { coarseness: u32::MAX, ..CullOptions::default() };
+    assert!(cull(&index, &trouble::view(1), &huge).is_ok());
+}
+
+#[test]
 fn occluders_that_rest_and_wake_change_nothing_that_shows() {
     let (mut idle, mut drawn) = (0, 0);
     for seed in 0..60 {
@@ -166,15 +210,20 @@ fn several_views_at_once_are_what_they_are_one_by_one() {
 fn within_the_margin_a_moved_eye_sees_nothing_that_was_left_out() {
     let random = &mut trouble::Random::new(11);
     let mut left_out = 0;
-    for seed in 0..150 {
+    for seed in 0..300 {
         let index = SceneIndex::build(trouble::scene(seed), &IndexOptions::default());
         let view = View { width: 64, height: 48, ..trouble::view(seed) };
         if matches!(view.projection, Projection::Perspective { fov_y, .. } if fov_y > 2.0) {
             continue;
         }
         let r = [0.01, 0.05, 0.2][random.below(3) as usize];
-        let options =
-            CullOptions { eye_moves: r, least_occluder_px: 0, least_piece_px: 0, ..CullOptions::default() };
+        let options = CullOptions {
+            eye_moves: r,
+            coarseness: [1, 1, 2, 3][random.below(4) as usize],
+            least_occluder_px: [0, 0, 60][random.below(3) as usize],
+            least_piece_px: 0,
+            ..CullOptions::default()
+        };
         let found = cull(&index, &view, &options).unwrap();
         let visible: HashSet<u32> = found.visible.iter().copied().collect();
         left_out += index.scene().instance_count() as usize - visible.len();

@@ -38,6 +38,15 @@ struct Open {
     whole: bool,
 }
 
+impl Open {
+    /// Pixels in the rectangle around it; as many as can be, where it may reach the near plane.
+    #[inline(always)]
+    fn pixels(&self) -> u32 {
+        let [left, top, right, bottom] = self.rect;
+        if self.nearest < f32::INFINITY { ((right - left + 1) * (bottom - top + 1)) as u32 } else { u32::MAX }
+    }
+}
+
 /// What is to be looked at, the nearest first; of what is equally near, what was found first.
 #[derive(Default)]
 struct Queue {
@@ -56,19 +65,42 @@ impl Queue {
     }
 
     #[inline(always)]
-    fn pop(&mut self) -> Option<(u32, Open)> {
+    fn pop(&mut self) -> Option<Open> {
         let place = !(self.order.pop()? as u32);
-        Some((place, self.found[place as usize]))
+        Some(self.found[place as usize])
     }
 }
 
-/// An instance that may be seen, as far as is known.
+/// An instance that may be seen, as far as is known before everything is drawn.
 struct Seen {
     instance: u32,
-    /// Its place in the queue.
-    open: u32,
+    open: Open,
     /// How many occluders had been drawn when it was judged.
     occluders: u64,
+    /// Its place among those judged, if they are noted.
+    judged: usize,
+}
+
+/// What the walk's options come to in pixels of the buffer.
+#[derive(Clone, Copy)]
+struct Thresholds {
+    /// An instance whose box covers fewer is not drawn, and boxes that cover fewer hold none that is.
+    occluder_px: u32,
+    piece_px: i32,
+    px_a_face: i32,
+}
+
+impl Thresholds {
+    fn new(options: &CullOptions) -> Thresholds {
+        let n = options.coarseness.max(1);
+        let length = |px: u32| px.div_ceil(n).min(1 << 20);
+        let area = |px: u32| px.div_ceil(n.saturating_mul(n)).min(1 << 20);
+        Thresholds {
+            occluder_px: area(options.least_occluder_px),
+            piece_px: length(options.least_piece_px) as i32,
+            px_a_face: area(options.least_px_a_face) as i32,
+        }
+    }
 }
 
 struct Walk<'a> {
@@ -76,10 +108,17 @@ struct Walk<'a> {
     occluders: &'a [Occluder],
     frame: &'a Frame,
     options: &'a CullOptions,
+    least: Thresholds,
     band: &'a mut Band,
     contexts: Vec<Context<'a>>,
+    /// What may hold an occluder.
     queue: Queue,
+    /// What is too small for that, in no order. Looked at when everything is drawn.
+    aside: Vec<Open>,
+    everything_is_drawn: bool,
     seen: Vec<Seen>,
+    /// Instances that may be seen, below the complement of the bits of their depth.
+    visible: Vec<u64>,
     /// Nodes of a mesh's tree to look at.
     stack: Vec<u32>,
     /// Occluders drawn before the walk.
@@ -107,10 +146,14 @@ pub(super) fn cull<S: Simd>(
         occluders,
         frame,
         options,
+        least: Thresholds::new(options),
         band,
         contexts: Vec::new(),
         queue: Queue::default(),
+        aside: Vec::new(),
+        everything_is_drawn: false,
         seen: Vec::new(),
+        visible: Vec::new(),
         stack: Vec::new(),
         drawn: HashSet::new(),
         idle: before.idle,
@@ -125,23 +168,39 @@ pub(super) fn cull<S: Simd>(
         }
     }
     walk.enter(simd, index.scene().root, frame.screen_from_world, 0);
-    while let Some((place, open)) = walk.queue.pop() {
-        walk.counters.boxes_asked += 1;
-        if walk.is_hidden(simd, &open) {
-            walk.counters.boxes_hidden += 1;
-            walk.credit(open.rect);
-            walk.judge(open.context, open.slot, open.moving, Reason::BoxHidden);
-            continue;
-        }
-        match open.slot.child() {
-            Child::Node(node) => walk.visit(simd, open.context, open.moving, node),
-            Child::Leaf(item) => walk.visit_item(simd, place, &open, item),
+    while let Some(open) = walk.queue.pop() {
+        walk.look_at(simd, &open);
+    }
+    walk.everything_is_drawn = true;
+    walk.ask_again(simd);
+    let small = std::mem::take(&mut walk.aside);
+    for open in &small {
+        walk.look_at(simd, open);
+        // What is inside it.
+        while let Some(open) = walk.aside.pop() {
+            walk.look_at(simd, &open);
         }
     }
-    walk.finish(simd)
+    walk.finish()
 }
 
 impl<'a> Walk<'a> {
+    /// Drops what is hidden, and opens what is not.
+    #[inline(always)]
+    fn look_at<S: Simd>(&mut self, simd: S, open: &Open) {
+        self.counters.boxes_asked += 1;
+        if self.is_hidden(simd, open) {
+            self.counters.boxes_hidden += 1;
+            self.credit(open.rect);
+            self.judge(open.context, open.slot, open.moving, Reason::BoxHidden);
+            return;
+        }
+        match open.slot.child() {
+            Child::Node(node) => self.visit(simd, open.context, open.moving, node),
+            Child::Leaf(item) => self.visit_item(simd, open, item),
+        }
+    }
+
     /// Opens a group's trees.
     #[inline(always)]
     fn enter<S: Simd>(&mut self, simd: S, group: u32, at: ScreenFromObject, first: u32) {
@@ -183,7 +242,7 @@ impl<'a> Walk<'a> {
                 self.judge(context, node.child[lane], moving, Reason::OutsideView);
                 continue;
             }
-            self.queue.push(Open {
+            let open = Open {
                 nearest: boxes.depth[lane],
                 farthest: boxes.farthest[lane],
                 slot: node.child[lane],
@@ -191,24 +250,28 @@ impl<'a> Walk<'a> {
                 moving,
                 rect: [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]],
                 whole: boxes.uncut >> lane & 1 == 1,
-            });
+            };
+            if self.everything_is_drawn || open.pixels() < self.least.occluder_px {
+                self.aside.push(open);
+            } else {
+                self.queue.push(open);
+            }
         }
     }
 
     #[inline(always)]
-    fn visit_item<S: Simd>(&mut self, simd: S, place: u32, open: &Open, item: u32) {
+    fn visit_item<S: Simd>(&mut self, simd: S, open: &Open, item: u32) {
         let c = &self.contexts[open.context as usize];
         let (item, group_at) = (&c.group.items[item as usize], c.at);
-        let [left, top, right, bottom] = open.rect;
-        let pixels = ((right - left + 1) * (bottom - top + 1)) as u32;
+        let pixels = open.pixels();
         let instance = c.first + item.first_instance;
         if let Content::Mesh(mesh) = item.content
             && open.nearest < f32::INFINITY
             && (pixels <= PX_OF_A_SPECK || open.whole && self.band.is_behind(open.rect, open.farthest))
         {
             // Nothing is before it yet: its smaller boxes would show like its own.
-            self.take_for_visible(place, instance, Reason::Shows);
-            if pixels >= self.options.least_occluder_px && pixels > PX_OF_A_SPECK {
+            self.take_for_visible(open, instance, Reason::Shows);
+            if self.draws(pixels) && pixels > PX_OF_A_SPECK {
                 self.draw(simd, instance, mesh, group_at.after(&item.group_from_content));
             }
             return;
@@ -222,12 +285,18 @@ impl<'a> Walk<'a> {
         match self.mesh_shows(simd, mesh, &at, pixels) {
             Shows::No(reason) => self.judge_one(instance, reason),
             Shows::Yes(reason) => {
-                self.take_for_visible(place, instance, reason);
-                if pixels >= self.options.least_occluder_px {
+                self.take_for_visible(open, instance, reason);
+                if self.draws(pixels) {
                     self.draw(simd, instance, mesh, at);
                 }
             }
         }
+    }
+
+    /// Whether an instance with a box of so many pixels is to be drawn.
+    #[inline(always)]
+    fn draws(&self, pixels: u32) -> bool {
+        pixels >= self.least.occluder_px && !self.everything_is_drawn
     }
 
     /// Whether what was drawn hides a box; never if it may be seen by an eye that moves, beyond the picture.
@@ -245,9 +314,15 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn take_for_visible(&mut self, open: u32, instance: u32, reason: Reason) {
+    #[inline(always)]
+    fn take_for_visible(&mut self, open: &Open, instance: u32, reason: Reason) {
         self.judge_one(instance, reason);
-        self.seen.push(Seen { instance, open, occluders: self.counters.occluders });
+        if self.everything_is_drawn {
+            self.visible.push(key(open.nearest, instance));
+            return;
+        }
+        let (occluders, judged) = (self.counters.occluders, self.judged.len());
+        self.seen.push(Seen { instance, open: *open, occluders, judged });
     }
 
     /// Draws an instance's opaque surface.
@@ -263,8 +338,8 @@ impl<'a> Walk<'a> {
         }
         self.band.drawing(self.hid.len() as u32);
         let mut standing = self.frame.standing_at(occluder, at);
-        standing.least_px = standing.least_px.max(self.options.least_piece_px as i32);
-        standing.px_a_face = self.options.least_px_a_face as i32;
+        standing.least_px = standing.least_px.max(self.least.piece_px);
+        standing.px_a_face = self.least.px_a_face;
         let mut drawn = Drawn::default();
         self.band.draw(simd, &standing, &mut drawn);
         if drawn.patches > 0 {
@@ -363,27 +438,27 @@ impl<'a> Walk<'a> {
         None
     }
 
-    /// Asks again about the boxes of all that was taken for visible, and puts the answer together.
+    /// Asks again about the boxes of what was taken for visible before everything was drawn.
     #[inline(always)]
-    fn finish<S: Simd>(mut self, simd: S) -> Culling {
-        let seen = std::mem::take(&mut self.seen);
-        let mut visible = Vec::with_capacity(seen.len());
-        for one in &seen {
-            let open = &self.queue.found[one.open as usize];
-            // Something was drawn since, and it may be hidden.
+    fn ask_again<S: Simd>(&mut self, simd: S) {
+        for one in std::mem::take(&mut self.seen) {
             let anew = one.occluders != self.counters.occluders;
-            if !(anew && self.is_hidden(simd, open)) {
-                visible.push(one.instance);
+            if !(anew && self.is_hidden(simd, &one.open)) {
+                self.visible.push(key(one.open.nearest, one.instance));
                 continue;
             }
             self.counters.second_thoughts += 1;
-            let rect = open.rect;
-            self.credit(rect);
+            self.credit(one.open.rect);
             if self.options.reasons {
-                self.judged.retain(|j| j.instances != (one.instance..one.instance + 1));
-                self.judge_one(one.instance, Reason::HiddenAfterAll);
+                self.judged[one.judged - 1].reason = Reason::HiddenAfterAll;
             }
         }
+    }
+
+    /// Puts the answer together.
+    fn finish(mut self) -> Culling {
+        self.visible.sort_unstable();
+        let visible = self.visible.iter().map(|key| *key as u32).collect();
         Culling { visible, judged: self.judged, counters: self.counters }
     }
 
@@ -419,6 +494,13 @@ impl<'a> Walk<'a> {
             }
         }
     }
+}
+
+/// Sorts instances: the nearest is the smallest; of what is equally near, that with the smaller number.
+#[inline(always)]
+fn key(nearest: f32, instance: u32) -> u64 {
+    // Depths that are 0 or more are ordered as their bits are.
+    u64::from(!nearest.to_bits()) << 32 | u64::from(instance)
 }
 
 enum Shows {
