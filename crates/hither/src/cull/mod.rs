@@ -9,6 +9,7 @@
 //! wholly in a shadow is hidden [Coorg & Teller 1996].
 
 mod buffer;
+mod closed;
 pub mod planes;
 mod scene;
 

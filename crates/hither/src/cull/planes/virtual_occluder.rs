@@ -11,6 +11,7 @@
 
 use super::model::PolygonModel;
 use super::occluder::Occluders;
+use crate::cull::closed::is_closed;
 use crate::geometry::{Aabb, box_meets_polygon};
 use glam::DVec3;
 use std::collections::HashMap;
@@ -82,18 +83,6 @@ fn components(model: &PolygonModel) -> Vec<Component> {
     }
     found.retain(|c| !c.polygons.is_empty());
     found
-}
-
-/// Whether every edge is walked as often one way as the other.
-fn is_closed(triangles: &[[u32; 3]]) -> bool {
-    let mut balance: HashMap<(u32, u32), i32> = HashMap::new();
-    for &[a, b, c] in triangles {
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            let way = if from < to { 1 } else { -1 };
-            *balance.entry((from.min(to), from.max(to))).or_default() += way;
-        }
-    }
-    balance.values().all(|&b| b == 0)
 }
 
 /// How often the surface winds round `at`, as seen from its fronts; near a whole number but at the surface.
