@@ -26,7 +26,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     let meaning = if sampled { Meaning::Sampled } else { Meaning::Continuous };
     let coherence = arguments.iter().any(|a| a == "coherence");
     let coarse = arguments.iter().find_map(|a| a.strip_prefix("coarse=")).map_or(Ok(1), str::parse)?;
-    let options = CullOptions { meaning, coherence, coarseness: coarse, ..CullOptions::default() };
+    let number_of = |name: &str, or: u32| {
+        let value = arguments.iter().find_map(|a| a.strip_prefix(name)?.strip_prefix('='));
+        value.map_or(Ok(or), str::parse)
+    };
+    let default = CullOptions::default();
+    let options = CullOptions {
+        meaning,
+        coherence,
+        coarseness: coarse,
+        least_occluder_px: number_of("occluder", default.least_occluder_px)?,
+        least_piece_px: number_of("piece", default.least_piece_px)?,
+        least_px_a_face: number_of("face", default.least_px_a_face)?,
+        ..default
+    };
+    let (samples, frames) = (number_of("samples", 4)?, number_of("frames", 30)?);
     let index = SceneIndex::build(scene, &IndexOptions::default());
     let mut culler = Culler::new();
     culler.prepare(&index);
@@ -35,13 +49,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         let view = index.scene().view(camera, size).ok_or("no camera")?;
         let mut times = Vec::new();
         let mut found = Default::default();
-        for _ in 0..30 {
+        for _ in 0..frames {
             let start = Instant::now();
             found = culler.cull(&index, &view, &options)?;
             times.push(start.elapsed().as_secs_f64() * 1e3);
         }
         times.sort_by(f64::total_cmp);
-        let (at_centres, finer) = (seen(&index, &view, 1)?, seen(&index, &view, 4)?);
+        let (at_centres, finer) = match samples {
+            0 => Default::default(),
+            side => (seen(&index, &view, 1)?, seen(&index, &view, side)?),
+        };
         let visible: HashSet<u32> = found.visible.iter().copied().collect();
         let truth = if sampled { &at_centres } else { &finer };
         println!(

@@ -79,8 +79,10 @@ pub(in crate::cull) struct Standing<'a> {
     pub size: [i32; 2],
     /// Patches that touch fewer pixels across or down than this are not worth drawing.
     pub least_px: i32,
-    /// Patches whose boxes cover fewer pixels than this for each face are not worth drawing.
+    /// Patches whose bounding boxes cover fewer pixels than this for each face are not worth drawing.
     pub px_a_face: i32,
+    /// Whether to draw the boxes inside such patches instead.
+    pub inner: bool,
     /// Draw all patches alike, face by face, as if none were loose or fine: slower, to compare with.
     pub plain: bool,
 }
@@ -180,13 +182,20 @@ impl Band {
                     let patch = &standing.occluder.patches[patch as usize];
                     let [left, top, right, bottom] = open.rect.map(i64::from);
                     let pixels = (right - left + 1) * (bottom - top + 1);
-                    if pixels < i64::from(patch.faces) * i64::from(standing.px_a_face) {
-                        continue;
+                    let least = |faces: u32| i64::from(faces) * i64::from(standing.px_a_face);
+                    // Three faces of a box are seen.
+                    let boxes = patch.inner.end - patch.inner.start;
+                    if pixels >= least(patch.faces) {
+                        simd.vectorize(
+                            #[inline(always)]
+                            || self.draw_patch(simd, standing, patch, open, drawn),
+                        );
+                    } else if standing.inner && boxes > 0 && pixels >= least(3 * boxes) {
+                        simd.vectorize(
+                            #[inline(always)]
+                            || self.draw_inner(simd, standing, patch, open, drawn),
+                        );
                     }
-                    simd.vectorize(
-                        #[inline(always)]
-                        || self.draw_patch(simd, standing, patch, open, drawn),
-                    );
                 }
             }
         }
@@ -257,35 +266,65 @@ impl Band {
         sorted.clip
     }
 
+    /// Draws the boxes inside a patch, if the eye is outside of its bounding box for certain, and nowhere else.
+    #[inline(always)]
+    fn draw_inner<S: Simd>(
+        &mut self,
+        simd: S,
+        standing: &Standing,
+        patch: &Patch,
+        open: Open,
+        drawn: &mut Drawn,
+    ) {
+        if !open.clear || standing.margin.is_some() {
+            return;
+        }
+        let Some(placing) = placing_of(standing, &open) else { return };
+        for inner in &standing.occluder.inner[patch.inner.start as usize..patch.inner.end as usize] {
+            if let Some(body) = inner.convex {
+                drawn.patches += 1;
+                drawn.faces += self.draw_convex(simd, standing, inner, body, &placing);
+            }
+        }
+    }
+
+    /// Draws a patch that is a convex body, before the near plane and inside the guard band. Returns how many of its
+    /// faces are seen.
+    #[inline(always)]
+    fn draw_convex<S: Simd>(
+        &mut self,
+        simd: S,
+        standing: &Standing,
+        patch: &Patch,
+        body: u32,
+        placing: &Placing,
+    ) -> u64 {
+        placing.place(simd, &standing.occluder.vertices, patch, &mut self.placed);
+        let drawing = convex::Drawing {
+            body: &standing.occluder.convex[body as usize],
+            placed: &self.placed,
+            eye: standing.eye,
+            front_sign: standing.at.front_sign as i32,
+            slack: placing.slack,
+        };
+        convex::draw(simd, &mut self.surface, &mut self.bounds, &drawing)
+    }
+
     #[inline(always)]
     fn draw_patch<S: Simd>(
         &mut self,
         simd: S,
         standing: &Standing,
         patch: &Patch,
-        Open { clear, depth, rect, .. }: Open,
+        open: Open,
         drawn: &mut Drawn,
     ) {
-        let near = standing.at.d[3];
-        // depth ≥ near / W for all of the patch.
-        let least_w = match standing.at.perspective {
-            true if clear => near / f64::from(depth),
-            true => near,
-            false => 1.0,
-        };
-        let Some(placing) = Placing::new(&standing.at, &standing.sizes, least_w) else { return };
+        let Some(placing) = placing_of(standing, &open) else { return };
+        let Open { clear, rect, .. } = open;
         let plain = standing.plain || standing.margin.is_some() || !clear;
         if let (false, Some(body)) = (plain, patch.convex) {
-            placing.place(simd, &standing.occluder.vertices, patch, &mut self.placed);
-            let drawing = convex::Drawing {
-                body: &standing.occluder.convex[body as usize],
-                placed: &self.placed,
-                eye: standing.eye,
-                front_sign: standing.at.front_sign as i32,
-                slack: placing.slack,
-            };
             drawn.patches += 1;
-            drawn.faces += convex::draw(simd, &mut self.surface, &mut self.bounds, &drawing);
+            drawn.faces += self.draw_convex(simd, standing, patch, body, &placing);
             return;
         }
         if let (false, Some(fine)) = (plain, &patch.fine)
@@ -548,6 +587,19 @@ impl Band {
             }
         }
     }
+}
+
+/// How the vertices of a patch are placed; `None` where f64 could not tell where on the screen they are.
+#[inline(always)]
+fn placing_of(standing: &Standing, open: &Open) -> Option<Placing> {
+    let near = standing.at.d[3];
+    // depth ≥ near / W for all of the patch.
+    let least_w = match standing.at.perspective {
+        true if open.clear => near / f64::from(open.depth),
+        true => near,
+        false => 1.0,
+    };
+    Placing::new(&standing.at, &standing.sizes, least_w)
 }
 
 /// The surface ends at every edge of a face, as far as the face knows.

@@ -52,6 +52,9 @@
 //! or to its farthest corner ([`mosaic`]). Else each face is filled, and only pixels that shared edges cross are
 //! counted ([`fill`]).
 //!
+//! What of a closed patch is not worth drawing may still hide by boxes that lie inside of it ([`inner`]): from outside
+//! the patch's bounding box, what such a box hides, the patch hides.
+//!
 //! # Sampled
 //!
 //! Asked with [`Meaning::Sampled`], the extent of a box are only the pixels whose centres it may hold, moved by no
@@ -74,10 +77,6 @@ mod convex;
 mod draw;
 mod fill;
 mod fine;
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "drawing far patches as their inner boxes is not wired yet")
-)]
 mod inner;
 mod loose;
 mod mosaic;
@@ -243,6 +242,7 @@ impl Frame {
             size: [self.view.width as i32, self.view.height as i32],
             least_px,
             px_a_face: 0,
+            inner: self.meaning == Meaning::Continuous,
             plain: false,
         }
     }

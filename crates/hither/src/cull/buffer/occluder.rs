@@ -6,6 +6,7 @@
 //! 3. patches: what is connected by pairs
 //! 4. two triangles that are nearly coplanar and form a convex quadrilateral become one face
 //! 5. lay out patch by patch, and sort the patches into a tree of boxes
+//! 6. find large boxes inside the closed patches of many faces
 //! ```
 //!
 //! Any triangles will do: open, closed, non-manifold, degenerate. What is paired decides only how *tight* the
@@ -13,11 +14,14 @@
 
 use super::convex::ConvexBody;
 use super::fine::{Fine, FineFaces};
+use super::inner::inner_boxes;
 use super::loose::LooseFaces;
 use crate::index::{Box3, WideTree, tree_of_boxes};
 use crate::scene::{AlphaMode, Material, Mesh};
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use std::collections::HashMap;
+use std::ops::Range;
 
 /// Which sides of an occluder's triangles hide what is behind them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +61,8 @@ pub struct Occluder {
     pub(super) loose: Vec<LooseFaces>,
     pub(super) fine: FineFaces,
     pub(super) convex: Vec<ConvexBody>,
+    /// Boxes inside closed patches, each a patch without faces of its own.
+    pub(super) inner: Vec<Patch>,
     triangles: usize,
 }
 
@@ -80,6 +86,8 @@ pub(super) struct Patch {
     pub fine: Option<Fine>,
     /// Its place among the convex bodies, if it is one of few faces.
     pub convex: Option<u32>,
+    /// The boxes inside of it.
+    pub inner: Range<u32>,
     pub bounds: Box3,
 }
 
@@ -166,6 +174,7 @@ impl Occluder {
             + size_of_val(self.loose.as_slice())
             + self.fine.memory_bytes()
             + size_of_val(self.convex.as_slice())
+            + size_of_val(self.inner.as_slice())
     }
 }
 
@@ -360,15 +369,85 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
                 first_vertex,
             ),
             convex,
+            inner: 0..0,
             bounds,
         });
         boxes.push(bounds);
     }
+    add_inner_boxes(&mut occluder);
     occluder.tree = tree_of_boxes(&boxes);
     occluder.reach = occluder.tree.bounds().reach();
     (occluder.loose, occluder.loose_of_node) =
         LooseFaces::of_tree(&occluder.tree, &occluder.patches, &occluder.faces, &occluder.vertices);
     occluder
+}
+
+/// A closed patch of fewer triangles is drawn as soon as the boxes inside of it.
+const LEAST_AROUND_BOXES: usize = 32;
+
+/// A patch is drawn as no more boxes than these.
+const MOST_INNER_BOXES: usize = 8;
+
+/// Finds the boxes inside the patches that are closed and have many faces.
+fn add_inner_boxes(occluder: &mut Occluder) {
+    let found: Vec<_> = occluder.patches.par_iter().map(|patch| boxes_inside(occluder, patch)).collect();
+    let faces = faces_of_a_box();
+    for (p, boxes) in found.into_iter().enumerate() {
+        let first = occluder.inner.len() as u32;
+        for corners in boxes {
+            let first_vertex = occluder.vertices.x.len() as u32;
+            corners.into_iter().for_each(|corner| occluder.vertices.push(corner));
+            if let Some(body) = ConvexBody::new(&faces, &occluder.vertices, first_vertex) {
+                let bounds = corners
+                    .iter()
+                    .map(|c| Box3 { min: c.to_array(), max: c.to_array() })
+                    .fold(Box3::EMPTY, |all, one| all.union(&one));
+                occluder.convex.push(body);
+                let convex = Some(occluder.convex.len() as u32 - 1);
+                let (first_face, faces, fine) = (0, 0, None);
+                let inner = 0..0;
+                let box_patch =
+                    Patch { first_vertex, vertices: 8, first_face, faces, fine, convex, inner, bounds };
+                occluder.inner.push(box_patch);
+            }
+        }
+        occluder.patches[p].inner = first..occluder.inner.len() as u32;
+    }
+}
+
+/// Corners of the boxes inside a patch, none if they would not be worth it.
+fn boxes_inside(occluder: &Occluder, patch: &Patch) -> Vec<[Vec3; 8]> {
+    let faces = &occluder.faces[patch.first_face as usize..][..patch.faces as usize];
+    let triangles: Vec<[u32; 3]> = faces
+        .iter()
+        .flat_map(|f| {
+            let [a, b, c, d] = f.corner;
+            [Some([a, b, c]), (f.corners == 4).then_some([a, c, d])].into_iter().flatten()
+        })
+        .collect();
+    let ends = |f: &Face| f.across[..usize::from(f.corners)].contains(&ENDS);
+    if triangles.len() < LEAST_AROUND_BOXES || faces.iter().any(ends) {
+        return Vec::new();
+    }
+    let v = &occluder.vertices;
+    let range = patch.first_vertex as usize..(patch.first_vertex + patch.vertices) as usize;
+    let points: Vec<DVec3> =
+        range.map(|i| DVec3::new(v.x[i].into(), v.y[i].into(), v.z[i].into())).collect();
+    inner_boxes(&points, &triangles, MOST_INNER_BOXES).into_iter().map(|found| found.corners).collect()
+}
+
+/// The six faces of a box whose corner k is at the far end of axis i if bit i of k is set.
+fn faces_of_a_box() -> [Face; 6] {
+    let corners: [[u32; 4]; 6] =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let has = |quad: &[u32; 4], from: u32, to: u32| (0..4).any(|k| (quad[k], quad[(k + 1) % 4]) == (from, to));
+    corners.map(|corner| {
+        let across = [0, 1, 2, 3].map(|k| {
+            let (from, to) = (corner[k], corner[(k + 1) % 4]);
+            corners.iter().position(|other| has(other, to, from)).map_or(ENDS, |f| f as u32)
+        });
+        Face { corner, across, corners: 4, two_sided: false }
+    })
 }
 
 /// The face that triangle `t`, merged across edge `k` or not, becomes; corners are still points.

@@ -40,6 +40,18 @@ fn attack(scene: &Scene, view: &View, random: &mut Random, rays: u32, what: &str
     } else {
         drawn(scene, view, &OcclusionOptions::default())
     };
+    shoot(&buffer, scene, view, random, rays, what)
+}
+
+/// As [`attack`], of a buffer.
+fn shoot(
+    buffer: &OcclusionBuffer,
+    scene: &Scene,
+    view: &View,
+    random: &mut Random,
+    rays: u32,
+    what: &str,
+) -> (u64, u64) {
     let sight = Sight::new(scene, view);
     let (mut covered, mut shot) = (0, 0);
     for y in 0..view.height {
@@ -201,16 +213,35 @@ fn no_pixel_holds_more_than_is_there_on_fine_and_loose_faces() {
 
 /// As [`drawn`], face by face.
 fn drawn_plainly(scene: &Scene, view: &View) -> OcclusionBuffer {
+    drawn_as(scene, view, |standing| standing.plain = true)
+}
+
+fn drawn_as(scene: &Scene, view: &View, change: impl Fn(&mut Standing)) -> OcclusionBuffer {
     let mut buffer = OcclusionBuffer::new(view, &OcclusionOptions::default()).unwrap();
     let level = buffer.frame.options.level;
     for instance in scene.instances() {
         let occluder = Occluder::of_mesh(&scene.meshes[instance.mesh as usize], &scene.materials);
         let mut standing = buffer.frame.standing(&occluder, &instance.world_from_mesh);
-        standing.plain = true;
+        change(&mut standing);
         let (band, mut drawn) = (&mut buffer.band, Drawn::default());
         dispatch!(level, simd => band.draw(simd, &standing, &mut drawn));
     }
     buffer
+}
+
+#[test]
+fn no_pixel_holds_more_than_is_there_where_only_boxes_inside_are_drawn() {
+    let random = &mut Random::new(31);
+    let (mut covered, mut shot) = (0, 0);
+    for seed in 0..600 {
+        let (scene, mut view) = if seed % 2 == 0 { rubble(seed) } else { (lumps(seed), bodies(seed).1) };
+        (view.width, view.height) = (view.width.max(40), view.height.max(40));
+        let buffer = drawn_as(&scene, &view, |standing| standing.px_a_face = 1 << 20);
+        let (c, s) = shoot(&buffer, &scene, &view, random, 4, &format!("seed {seed}"));
+        covered += c;
+        shot += s;
+    }
+    assert!(covered > 20_000 && shot > 80_000, "{covered} pixels, {shot} rays");
 }
 
 #[test]
