@@ -84,7 +84,9 @@ impl ConvexBody {
                 } else {
                     // The face across came before; it has this edge the other way.
                     let there = (0..edges).find(|&e| {
-                        body.edge[e] == [b, a] && body.edges[other] >> e & 1 == 1 && body.edges[f] >> e & 1 == 0
+                        body.edge[e] == [b, a]
+                            && body.edges[other] >> e & 1 == 1
+                            && body.edges[f] >> e & 1 == 0
                     });
                     body.edges[f] |= 1 << there?;
                 }
@@ -298,12 +300,11 @@ fn fill<S: Simd>(simd: S, surface: &mut Surface, bounds: &Bounds, seen: &Seen, r
 fn spans<S: Simd>(simd: S, bounds: &Bounds, y: f32, inside: u32) -> [f32x16<S>; 2] {
     let rows = f32x16::from_slice(simd, &COLUMNS) + y;
     let (mut from, mut to) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, FAR));
-    let bound = |k: usize| (rows - bounds.y0[k]) * bounds.per_row[k] + bounds.base[k];
     for k in 0..bounds.lefts.min(16) {
-        from = from.max(bound(k));
+        from = from.max((rows - bounds.y0[k]) * bounds.per_row[k] + bounds.base[k]);
     }
     for k in 16 - bounds.rights.min(16)..16 {
-        to = to.min(bound(k));
+        to = to.min((rows - bounds.y0[k]) * bounds.per_row[k] + bounds.base[k]);
     }
     let far = f32x16::splat(simd, FAR);
     let inside = mask32x16::from_bitmask(simd, u64::from(inside));
@@ -342,14 +343,22 @@ fn fill_tiles<S: Simd>(
             surface.cover(simd, tile, over.plane[0]);
         } else {
             let (planes, farthest) = (&over.plane[..over.count.min(FACES)], &over.farthest);
-            let depth = |row: usize| {
-                let mut least = f32x16::splat(simd, over.highest);
-                for (plane, farthest) in planes.iter().zip(farthest) {
-                    least = least.min(plane.row(simd, row as i32).max(*farthest));
-                }
-                least
-            };
-            surface.raise_spans(simd, tile, [from - x_first, to - x_first], meets, depth, over.highest);
+            let spans = [from - x_first, to - x_first];
+            surface.raise_spans(
+                simd,
+                tile,
+                spans,
+                meets,
+                #[inline(always)]
+                |row| {
+                    let mut least = f32x16::splat(simd, over.highest);
+                    for (plane, farthest) in planes.iter().zip(farthest) {
+                        least = least.min(plane.row(simd, row as i32).max(*farthest));
+                    }
+                    least
+                },
+                over.highest,
+            );
         }
     }
 }

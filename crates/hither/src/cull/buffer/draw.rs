@@ -182,20 +182,11 @@ impl Band {
                     let patch = &standing.occluder.patches[patch as usize];
                     let [left, top, right, bottom] = open.rect.map(i64::from);
                     let pixels = (right - left + 1) * (bottom - top + 1);
-                    let least = |faces: u32| i64::from(faces) * i64::from(standing.px_a_face);
-                    // Three faces of a box are seen.
-                    let boxes = patch.inner.end - patch.inner.start;
-                    if pixels >= least(patch.faces) {
-                        simd.vectorize(
-                            #[inline(always)]
-                            || self.draw_patch(simd, standing, patch, open, drawn),
-                        );
-                    } else if standing.inner && boxes > 0 && pixels >= least(3 * boxes) {
-                        simd.vectorize(
-                            #[inline(always)]
-                            || self.draw_inner(simd, standing, patch, open, drawn),
-                        );
-                    }
+                    let Some(bodies) = bodies(standing, patch, &open, pixels) else { continue };
+                    simd.vectorize(
+                        #[inline(always)]
+                        || self.draw_patch(simd, standing, patch, open, bodies, drawn),
+                    );
                 }
             }
         }
@@ -266,50 +257,7 @@ impl Band {
         sorted.clip
     }
 
-    /// Draws the boxes inside a patch, if the eye is outside of its bounding box for certain, and nowhere else.
-    #[inline(always)]
-    fn draw_inner<S: Simd>(
-        &mut self,
-        simd: S,
-        standing: &Standing,
-        patch: &Patch,
-        open: Open,
-        drawn: &mut Drawn,
-    ) {
-        if !open.clear || standing.margin.is_some() {
-            return;
-        }
-        let Some(placing) = placing_of(standing, &open) else { return };
-        for inner in &standing.occluder.inner[patch.inner.start as usize..patch.inner.end as usize] {
-            if let Some(body) = inner.convex {
-                drawn.patches += 1;
-                drawn.faces += self.draw_convex(simd, standing, inner, body, &placing);
-            }
-        }
-    }
-
-    /// Draws a patch that is a convex body, before the near plane and inside the guard band. Returns how many of its
-    /// faces are seen.
-    #[inline(always)]
-    fn draw_convex<S: Simd>(
-        &mut self,
-        simd: S,
-        standing: &Standing,
-        patch: &Patch,
-        body: u32,
-        placing: &Placing,
-    ) -> u64 {
-        placing.place(simd, &standing.occluder.vertices, patch, &mut self.placed);
-        let drawing = convex::Drawing {
-            body: &standing.occluder.convex[body as usize],
-            placed: &self.placed,
-            eye: standing.eye,
-            front_sign: standing.at.front_sign as i32,
-            slack: placing.slack,
-        };
-        convex::draw(simd, &mut self.surface, &mut self.bounds, &drawing)
-    }
-
+    /// Draws a patch: as the bodies that are given, if there are any.
     #[inline(always)]
     fn draw_patch<S: Simd>(
         &mut self,
@@ -317,14 +265,26 @@ impl Band {
         standing: &Standing,
         patch: &Patch,
         open: Open,
+        bodies: &[Patch],
         drawn: &mut Drawn,
     ) {
         let Some(placing) = placing_of(standing, &open) else { return };
         let Open { clear, rect, .. } = open;
         let plain = standing.plain || standing.margin.is_some() || !clear;
-        if let (false, Some(body)) = (plain, patch.convex) {
+        for body in bodies {
+            let Some(convex) = body.convex else { continue };
+            placing.place(simd, &standing.occluder.vertices, body, &mut self.placed);
+            let drawing = convex::Drawing {
+                body: &standing.occluder.convex[convex as usize],
+                placed: &self.placed,
+                eye: standing.eye,
+                front_sign: standing.at.front_sign as i32,
+                slack: placing.slack,
+            };
             drawn.patches += 1;
-            drawn.faces += self.draw_convex(simd, standing, patch, body, &placing);
+            drawn.faces += convex::draw(simd, &mut self.surface, &mut self.bounds, &drawing);
+        }
+        if !bodies.is_empty() {
             return;
         }
         if let (false, Some(fine)) = (plain, &patch.fine)
@@ -587,6 +547,27 @@ impl Band {
             }
         }
     }
+}
+
+/// Smaller boxes hide too little for what it takes to place them.
+const PX_A_FACE_OF_A_BOX: i32 = 32;
+
+/// The convex bodies as which a patch is drawn: itself, if it is one, or, if its `pixels` are few for its faces, the boxes
+/// inside of it. None stands for its faces; `None` for a patch that is not worth drawing.
+#[inline(always)]
+fn bodies<'a>(standing: &Standing<'a>, patch: &'a Patch, open: &Open, pixels: i64) -> Option<&'a [Patch]> {
+    let worth = |faces: u32| pixels >= i64::from(faces) * i64::from(standing.px_a_face);
+    // Bodies are drawn whole, beyond the near plane, and for one eye. It is outside of the bounding box, then.
+    let whole = open.clear && !standing.plain && standing.margin.is_none();
+    if worth(patch.faces) {
+        let itself = whole && patch.convex.is_some();
+        return Some(if itself { std::slice::from_ref(patch) } else { &[] });
+    }
+    let inner = &standing.occluder.inner[patch.inner.start as usize..patch.inner.end as usize];
+    // Three faces of a box are seen.
+    let faces = 3 * inner.len() as i64;
+    let worth = pixels >= faces * i64::from(standing.px_a_face.max(PX_A_FACE_OF_A_BOX));
+    (whole && standing.inner && faces > 0 && worth).then_some(inner)
 }
 
 /// How the vertices of a patch are placed; `None` where f64 could not tell where on the screen they are.

@@ -449,8 +449,15 @@ fn fill_tiles<S: Simd>(
             surface.cover(simd, tile, over);
         } else {
             let depths = over.rows(simd);
-            let depth = |row: usize| depths.row(simd, row);
-            surface.raise_spans(simd, tile, [*from - x_first, *to - x_first], meets, depth, highest);
+            surface.raise_spans(
+                simd,
+                tile,
+                [*from - x_first, *to - x_first],
+                meets,
+                #[inline(always)]
+                |row| depths.row(simd, row),
+                highest,
+            );
         }
     }
 }

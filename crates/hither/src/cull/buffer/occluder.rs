@@ -431,8 +431,7 @@ fn boxes_inside(occluder: &Occluder, patch: &Patch) -> Vec<[Vec3; 8]> {
     }
     let v = &occluder.vertices;
     let range = patch.first_vertex as usize..(patch.first_vertex + patch.vertices) as usize;
-    let points: Vec<DVec3> =
-        range.map(|i| DVec3::new(v.x[i].into(), v.y[i].into(), v.z[i].into())).collect();
+    let points: Vec<DVec3> = range.map(|i| DVec3::new(v.x[i].into(), v.y[i].into(), v.z[i].into())).collect();
     inner_boxes(&points, &triangles, MOST_INNER_BOXES).into_iter().map(|found| found.corners).collect()
 }
 
@@ -440,7 +439,8 @@ fn boxes_inside(occluder: &Occluder, patch: &Patch) -> Vec<[Vec3; 8]> {
 fn faces_of_a_box() -> [Face; 6] {
     let corners: [[u32; 4]; 6] =
         [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-    let has = |quad: &[u32; 4], from: u32, to: u32| (0..4).any(|k| (quad[k], quad[(k + 1) % 4]) == (from, to));
+    let has =
+        |quad: &[u32; 4], from: u32, to: u32| (0..4).any(|k| (quad[k], quad[(k + 1) % 4]) == (from, to));
     corners.map(|corner| {
         let across = [0, 1, 2, 3].map(|k| {
             let (from, to) = (corner[k], corner[(k + 1) % 4]);
