@@ -11,10 +11,12 @@ use hither::scene::{Content, Transform};
 use hither::{Algorithm, Frame, IndexOptions, RenderOptions, Renderer, Scene, SceneIndex, render};
 use proptest::prelude::*;
 
-/// Every instruction set this machine has, plain code included.
+/// Every instruction set this machine has; with the feature `portable`, code without any too.
 fn levels() -> Vec<Level> {
     let best = Level::new();
     let mut levels = vec![best];
+    #[cfg(feature = "portable")]
+    levels.push(Level::fallback());
     #[cfg(target_arch = "x86_64")]
     {
         levels.extend(best.as_avx2().map(Level::Avx2));

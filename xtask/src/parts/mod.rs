@@ -36,10 +36,15 @@ type Part = fn(&mut Job) -> Result<Outcome>;
 const PARTS: &[(&str, Part)] = &[
     ("tidy", |job| Ok(passed(tidy::run(job.root, false)?))),
     ("tests", |job| job.cargo_test(&["--workspace", "--no-fail-fast"])),
+    ("without vector instructions", |job| job.cargo_test(WITHOUT_VECTORS)),
     ("documentation", documentation),
     ("files read by others", readers::run),
     ("Embree agrees", embree::run),
 ];
+
+/// One scene, all algorithms, one truth: with code that uses no vector instructions among the instruction sets.
+const WITHOUT_VECTORS: &[&str] =
+    &["--package=hither", "--profile=portable", "--features=portable", "--test=visibility"];
 
 /// Runs every part and prints what became of each. Says whether all is well.
 pub fn run(root: &Path, require_all: bool) -> Result<bool> {

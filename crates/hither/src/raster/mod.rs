@@ -48,3 +48,15 @@ pub const TILE: u32 = 16;
 
 /// Side of a block, pixels.
 pub const BLOCK: u32 = 4;
+
+/// The best and the plainest instruction set of this machine; with the feature `portable`, code without any too.
+#[cfg(test)]
+pub(crate) fn levels() -> Vec<fearless_simd::Level> {
+    use fearless_simd::Level;
+    vec![
+        Level::new(),
+        Level::baseline(),
+        #[cfg(feature = "portable")]
+        Level::fallback(),
+    ]
+}

@@ -595,8 +595,9 @@ impl Surface {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::levels;
     use crate::reference::trouble::Random;
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::dispatch;
 
     /// A surface of planes, spans of rows and single rows, in any order.
     #[inline(always)]
@@ -668,7 +669,7 @@ mod tests {
 
     #[test]
     fn what_is_said_of_rectangles_is_what_their_pixels_say() {
-        for level in [Level::new(), Level::baseline()] {
+        for level in levels() {
             let random = &mut Random::new(5);
             let mut asked = [0; 3];
             for _ in 0..400 {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::geometry::Aabb;
+use crate::raster::levels;
 use crate::reference::sight::Sight;
 use crate::reference::trouble::{self, Random};
 use crate::scene::{Content, Material, Mesh, Node, Primitive, Scene, Transform};
@@ -382,8 +383,10 @@ fn order_instruction_set_bands_and_threads_change_nothing() {
     for seed in 0..40 {
         let (scene, view) = (trouble::scene(seed + 1000), trouble::view(seed + 1000));
         let reference = drawn(&scene, &view, &OcclusionOptions::default()).depths();
-        let plain = OcclusionOptions { level: Level::baseline(), ..OcclusionOptions::default() };
-        assert!(drawn(&scene, &view, &plain).depths() == reference, "seed {seed}: instruction sets differ");
+        for level in levels() {
+            let plain = OcclusionOptions { level, ..OcclusionOptions::default() };
+            assert!(drawn(&scene, &view, &plain).depths() == reference, "seed {seed}: {level:?} differs");
+        }
         let occluders: Vec<Occluder> =
             scene.meshes.iter().map(|m| Occluder::of_mesh(m, &scene.materials)).collect();
         let mut instances = scene.instances();

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::conventions::{Projection, View};
-use crate::raster::{Drawing, ScreenFromObject, TriangleBlock, draw_block};
+use crate::raster::{Drawing, ScreenFromObject, TriangleBlock, draw_block, levels};
 use glam::DAffine3;
 
 /// Numbers that follow from a seed (a linear congruential generator's high bits).
@@ -59,7 +59,7 @@ fn a_rectangle_is_hidden_exactly_where_all_its_pixels_are() {
     let mut random = Random(1);
     let mut hidden = 0;
     for (width, height) in [(1, 1), (17, 5), (64, 64), (203, 90), (500, 333)] {
-        for level in [Level::new(), Level::baseline()] {
+        for level in levels() {
             let mut target = Target::new(0, 0, width, height);
             for size in [900, 200, 40, 9] {
                 draw_some(&mut target, level, size, &mut random);
