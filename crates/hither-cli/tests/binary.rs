@@ -394,6 +394,9 @@ fn cull_names_what_could_be_seen_and_leaves_out_nothing_that_is() {
     let judged =
         frame["reasons"].as_array().unwrap().iter().map(|r| r["count"].as_u64().unwrap()).sum::<u64>();
     assert_eq!(judged, 27);
+    let coarse = report("buffer", &["--coarse", "4"]);
+    let left_in = visible(&coarse["frames"][0]);
+    assert!(coarse["coarse"] == 4 && exact.iter().all(|i| left_in.contains(i)));
     let sampled = visible(&report("buffer", &["--sampled"])["frames"][0]);
     assert!(exact.iter().all(|i| sampled.contains(i)) && sampled.iter().all(|i| found.contains(i)));
     let moving = visible(&report("buffer", &["--margin", "0.1", "--objects-move", "0.1"])["frames"][0]);
@@ -409,6 +412,9 @@ fn cull_refuses_what_it_cannot_do() {
     refused(&["cull", WORLD, "--margin", "nan"], 2, &["--margin", "metres"]);
     refused(&["cull", WORLD, "--method", "exact", "--margin", "1"], 2, &["--margin", "buffer"]);
     refused(&["cull", WORLD, "--sampled", "--margin", "1"], 2, &["--sampled", "--margin"]);
+    refused(&["cull", WORLD, "--sampled", "--coarse", "2"], 2, &["--sampled", "--coarse"]);
+    refused(&["cull", WORLD, "--method", "exact", "--coarse", "2"], 2, &["--coarse", "buffer"]);
+    refused(&["cull", WORLD, "--coarse", "0"], 2, &["--coarse", "1"]);
     refused(&["cull", WORLD, "--method", "exact", "--sampled"], 2, &["--sampled", "buffer"]);
     refused(&["cull", WORLD, "--method", "planes", "--objects-move", "1"], 2, &["--objects-move", "buffer"]);
     refused(&["cull", WORLD, "--method", "exact", "--map", "x.svg"], 2, &["--map", "planes"]);
