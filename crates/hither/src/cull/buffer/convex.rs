@@ -376,17 +376,16 @@ struct OverTile {
 fn over_tile(seen: &Seen, x: i32, y: i32) -> OverTile {
     let mut over =
         OverTile { plane: [TilePlane::ZERO; FACES], farthest: [0.0; FACES], count: 0, highest: seen.nearest };
-    let mut least = [0.0; FACES];
-    for k in 0..seen.count.min(FACES) {
-        let plane = tile_plane(seen.plane[k], x, y);
-        over.plane[k] = plane;
-        least[k] = plane.min(0, 0, 15, 15).max(seen.farthest[k]);
-        over.highest = over.highest.min(plane.max().max(seen.farthest[k]));
+    let mut over_all = [(TilePlane::ZERO, 0.0); FACES];
+    let count = seen.count.min(FACES);
+    for ((to, plane), &farthest) in over_all[..count].iter_mut().zip(&seen.plane).zip(&seen.farthest) {
+        let plane = tile_plane(*plane, x, y);
+        over.highest = over.highest.min(plane.max().max(farthest));
+        *to = (plane, farthest);
     }
-    for k in 0..seen.count.min(FACES) {
-        if least[k] <= over.highest {
-            over.plane[over.count & 7] = over.plane[k];
-            over.farthest[over.count & 7] = seen.farthest[k];
+    for &(plane, farthest) in &over_all[..count] {
+        if plane.min(0, 0, 15, 15).max(farthest) <= over.highest {
+            (over.plane[over.count & 7], over.farthest[over.count & 7]) = (plane, farthest);
             over.count += 1;
         }
     }
