@@ -2,7 +2,11 @@
 //!
 //! ```sh
 //! cargo run --release -p hither-bench --example cull_scene -- FILE|world:SPEC WIDTH HEIGHT [sampled] [coherence] [coarse=N]
+//!     [occluder=PX] [piece=PX] [face=PX] [frames=N] [samples=N]
 //! ```
+//!
+//! The second line's are the thresholds of [`CullOptions`], how many frames are timed, and samples a pixel each way (4; 0
+//! for none).
 //!
 //! *Seen* are the instances that are nearest at a pixel's centre, and at one of 4×4 samples a pixel.
 

@@ -153,12 +153,12 @@ struct Seen {
 /// No column of an image is so far away.
 const FAR: f32 = 65536.0;
 
-/// Draws a body. Returns how many of its faces are seen.
+/// Draws a body. Returns how many of its faces are seen, none if it is too small to cover anything.
 #[inline(always)]
 pub(super) fn draw<S: Simd>(simd: S, surface: &mut Surface, bounds: &mut Bounds, drawing: &Drawing) -> u64 {
     let faces = turned_to(simd, drawing.body, drawing.eye);
     if !set_bounds(simd, bounds, drawing, faces) {
-        return u64::from(faces.count_ones());
+        return 0;
     }
     let [first, top, last, bottom] = bounds.rect;
     let top = (top - surface.top).max(0);
@@ -339,7 +339,7 @@ fn fill_tiles<S: Simd>(
             continue;
         }
         let whole = meets == 0xFFFF && (from.simd_le(x_first) & to.simd_ge(x_last)).all_true();
-        if whole && over.count == 1 {
+        if whole && over.is_one_plane() {
             surface.cover(simd, tile, over.plane[0]);
         } else {
             let (planes, farthest) = (&over.plane[..over.count.min(FACES)], &over.farthest);
@@ -363,13 +363,23 @@ fn fill_tiles<S: Simd>(
     }
 }
 
-/// The planes that are the least somewhere in a tile.
+/// The planes that are the least somewhere in a tile. One that is nowhere below `highest` is left out: where its face
+/// covers some of a pixel, the plane, lowered, is no nearer there than the nearest corner, so that face covers nothing
+/// of the tile.
 struct OverTile {
     plane: [TilePlane; FACES],
     farthest: [f32; FACES],
     count: usize,
     /// No depth is larger.
     highest: f32,
+}
+
+impl OverTile {
+    /// Whether a single plane holds everywhere, nowhere below its face's farthest corner, nor behind everything.
+    #[inline(always)]
+    fn is_one_plane(&self) -> bool {
+        self.count == 1 && self.plane[0].min(0, 0, 15, 15) >= self.farthest[0].max(0.0)
+    }
 }
 
 #[inline(always)]

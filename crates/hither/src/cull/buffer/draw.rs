@@ -281,8 +281,9 @@ impl Band {
                 front_sign: standing.at.front_sign as i32,
                 slack: placing.slack,
             };
-            drawn.patches += 1;
-            drawn.faces += convex::draw(simd, &mut self.surface, &mut self.bounds, &drawing);
+            let faces = convex::draw(simd, &mut self.surface, &mut self.bounds, &drawing);
+            drawn.patches += u64::from(faces > 0);
+            drawn.faces += faces;
         }
         if !bodies.is_empty() {
             return;

@@ -44,10 +44,11 @@
 //! *Cutting* at the near plane and at the guard band replaces the chain by another with the same cut points for
 //! both owners of an edge; what the near plane cuts ends there.
 //!
-//! # Three ways to draw a patch
+//! # Four ways to draw a patch
 //!
 //! All rest on the same inequality; they differ in what they need not look at. A patch of one face ends at every
-//! edge, so a pixel is covered where it lies inside all of them ([`loose`]). In a patch of faces that are not large
+//! edge, so a pixel is covered where it lies inside all of them ([`loose`]); of a closed convex patch of few faces, wholly
+//! beyond the near plane, where it lies inside all edges of the silhouette ([`convex`]). In a patch of faces that are not large
 //! N(c) is counted from the outline alone, and each face lowers depth in the whole rectangle around it, to its plane
 //! or to its farthest corner ([`mosaic`]). Else each face is filled, and only pixels that shared edges cross are
 //! counted ([`fill`]).

@@ -50,15 +50,16 @@ pub struct CullOptions {
     pub meaning: Meaning,
     /// Occluders are drawn, and boxes asked about, at so many of the view's pixels across and down a pixel: 1, 2, 4 or
     /// any other number. The answer is as true, whatever it is; more cost less, and leave out less, above all of what
-    /// is seen through gaps of a few pixels. 1 if sampled: centres are those of the view's pixels.
+    /// is seen through gaps of a few pixels. Thresholds in pixels are rounded up to whole ones of these. 1 if sampled:
+    /// centres are those of the view's pixels.
     pub coarseness: u32,
     /// Instances whose boxes cover fewer pixels of the view than this are not drawn as occluders. Smaller hides more, and
     /// costs more.
     pub least_occluder_px: u32,
     /// Connected pieces of an occluder that touch fewer pixels of the view across or down are left out.
     pub least_piece_px: u32,
-    /// So are pieces whose boxes cover fewer pixels of the view than this for each of their faces: they cost more than
-    /// they hide.
+    /// So are pieces whose bounding boxes cover fewer pixels of the view than this for each of their faces: they cost more
+    /// than they hide. If one is closed, and large enough, a few boxes inside of it are drawn instead.
     pub least_px_a_face: u32,
     /// Boxes of a mesh's own tree that are asked about before an instance counts as visible.
     pub boxes_an_instance: u32,

@@ -94,11 +94,11 @@ impl Thresholds {
     fn new(options: &CullOptions) -> Thresholds {
         let n = options.coarseness.max(1);
         let length = |px: u32| px.div_ceil(n).min(1 << 20);
-        let area = |px: u32| px.div_ceil(n.saturating_mul(n)).min(1 << 20);
+        let area = |px: u32| px.div_ceil(n.saturating_mul(n));
         Thresholds {
             occluder_px: area(options.least_occluder_px),
             piece_px: length(options.least_piece_px) as i32,
-            px_a_face: area(options.least_px_a_face) as i32,
+            px_a_face: area(options.least_px_a_face).min(1 << 20) as i32,
         }
     }
 }
