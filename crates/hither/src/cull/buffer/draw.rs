@@ -271,20 +271,7 @@ impl Band {
         let Some(placing) = placing_of(standing, &open) else { return };
         let Open { clear, rect, .. } = open;
         let plain = standing.plain || standing.margin.is_some() || !clear;
-        for body in bodies {
-            let Some(convex) = body.convex else { continue };
-            placing.place(simd, &standing.occluder.vertices, body, &mut self.placed);
-            let drawing = convex::Drawing {
-                body: &standing.occluder.convex[convex as usize],
-                placed: &self.placed,
-                eye: standing.eye,
-                front_sign: standing.at.front_sign as i32,
-                slack: placing.slack,
-            };
-            let faces = convex::draw(simd, &mut self.surface, &mut self.bounds, &drawing);
-            drawn.patches += u64::from(faces > 0);
-            drawn.faces += faces;
-        }
+        self.draw_bodies(simd, standing, bodies, &placing, drawn);
         if !bodies.is_empty() {
             return;
         }
@@ -331,6 +318,31 @@ impl Band {
             self.joint.finish_eroded(simd, &mut self.surface, self.placed.nearest, margin_px);
         } else {
             self.joint.finish(simd, &mut self.surface, self.placed.nearest);
+        }
+    }
+
+    #[inline(always)]
+    fn draw_bodies<S: Simd>(
+        &mut self,
+        simd: S,
+        standing: &Standing,
+        bodies: &[Patch],
+        placing: &Placing,
+        drawn: &mut Drawn,
+    ) {
+        for body in bodies {
+            let Some(convex) = body.convex else { continue };
+            placing.place(simd, &standing.occluder.vertices, body, &mut self.placed);
+            let drawing = convex::Drawing {
+                body: &standing.occluder.convex[convex as usize],
+                placed: &self.placed,
+                eye: standing.eye,
+                front_sign: standing.at.front_sign as i32,
+                slack: placing.slack,
+            };
+            let faces = convex::draw(simd, &mut self.surface, &mut self.bounds, &drawing);
+            drawn.patches += u64::from(faces > 0);
+            drawn.faces += faces;
         }
     }
 

@@ -353,11 +353,7 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
         while !occluder.vertices.x.len().is_multiple_of(8) {
             occluder.vertices.repeat_last();
         }
-        let body = ConvexBody::new(&occluder.faces[first_face as usize..], &occluder.vertices, first_vertex);
-        let convex = body.map(|body| {
-            occluder.convex.push(body);
-            occluder.convex.len() as u32 - 1
-        });
+        let convex = add_convex(&mut occluder, first_face, first_vertex);
         occluder.patches.push(Patch {
             first_vertex,
             vertices: occluder.vertices.x.len() as u32 - first_vertex,
@@ -380,6 +376,13 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
     (occluder.loose, occluder.loose_of_node) =
         LooseFaces::of_tree(&occluder.tree, &occluder.patches, &occluder.faces, &occluder.vertices);
     occluder
+}
+
+/// Keeps the last patch as a convex body, if it is one.
+fn add_convex(occluder: &mut Occluder, first_face: u32, first_vertex: u32) -> Option<u32> {
+    let body = ConvexBody::new(&occluder.faces[first_face as usize..], &occluder.vertices, first_vertex)?;
+    occluder.convex.push(body);
+    Some(occluder.convex.len() as u32 - 1)
 }
 
 /// A closed patch of fewer triangles is drawn as soon as the boxes inside of it.
