@@ -16,8 +16,9 @@
 //! edge touches it, and none does on the way from its snapped corners to the true ones.
 //!
 //! *Depth.* Each face that is taken stands for the larger of its plane, lowered as in [`fill`](super::fill), and its
-//! farthest corner, wherever the patch is: a pixel that a face does not touch can only lose by that. It loses nothing
-//! where the body is convex, as there every plane of a face that is seen is nowhere beyond the surface.
+//! farthest corner, wherever the patch is: a pixel that a face does not touch can only lose by that. It loses little
+//! where the body is convex: there no plane of a face that is seen is beyond the surface, and lowered ones are so for
+//! about a pixel beside their face.
 //!
 //! So convexity is what makes this good, not what makes it right, and what is called convex may be so roughly.
 

@@ -76,16 +76,19 @@ fn shoot(
     (covered, shot)
 }
 
+/// [`attack`]s so many scenes.
+fn attack_all(seeds: u64, scene_of: impl Fn(u64) -> (Scene, View), rays: u32, random: u64) -> (u64, u64) {
+    let random = &mut Random::new(random);
+    (0..seeds).fold((0, 0), |(covered, shot), seed| {
+        let (scene, view) = scene_of(seed);
+        let (c, s) = attack(&scene, &view, random, rays, &format!("seed {seed}"));
+        (covered + c, shot + s)
+    })
+}
+
 #[test]
 fn no_pixel_holds_more_than_is_there_in_trouble() {
-    let random = &mut Random::new(1);
-    let (mut covered, mut shot) = (0, 0);
-    for seed in 0..3000 {
-        let (scene, view) = (trouble::scene(seed), trouble::view(seed));
-        let (c, s) = attack(&scene, &view, random, 6, &format!("seed {seed}"));
-        covered += c;
-        shot += s;
-    }
+    let (covered, shot) = attack_all(3000, |seed| (trouble::scene(seed), trouble::view(seed)), 6, 1);
     assert!(covered > 100_000 && shot > 600_000, "{covered} pixels, {shot} rays");
 }
 
@@ -159,6 +162,18 @@ fn no_pixel_holds_more_than_is_there_on_folded_closed_surfaces() {
     assert!(covered > 200_000 && shot > 800_000, "{covered} pixels, {shot} rays");
 }
 
+/// A view from near or as far as `far`, at most so many pixels each way, in perspective or not.
+fn some_view(random: &mut Random, most: u32, far: f64) -> View {
+    let size = (1 + random.below(most), 1 + random.below(most));
+    let reach = [3.0, 6.0, far, 1.0][random.below(4) as usize];
+    let mut view = around(random, reach, size);
+    if random.one_in(3) {
+        view.projection =
+            Projection::Orthographic { half_height: random.between(1.0, 6.0), near: 0.05, far: 50.0 };
+    }
+    view
+}
+
 /// Lumps of many faces and rubble of single ones, some seen from both sides, with holes, mirrored or not.
 fn rubble(seed: u64) -> (Scene, View) {
     let random = &mut Random::new(seed);
@@ -189,26 +204,12 @@ fn rubble(seed: u64) -> (Scene, View) {
         let local = Transform::Trs { translation: at, rotation: glam::DQuat::IDENTITY, scale: flip };
         scene.groups[0].push(Node { content, local, ..Node::default() });
     }
-    let size = (1 + random.below(90), 1 + random.below(90));
-    let reach = [3.0, 6.0, 20.0, 1.0][random.below(4) as usize];
-    let mut view = around(random, reach, size);
-    if random.one_in(3) {
-        view.projection =
-            Projection::Orthographic { half_height: random.between(1.0, 6.0), near: 0.05, far: 50.0 };
-    }
-    (scene, view)
+    (scene, some_view(random, 90, 20.0))
 }
 
 #[test]
 fn no_pixel_holds_more_than_is_there_on_fine_and_loose_faces() {
-    let random = &mut Random::new(12);
-    let (mut covered, mut shot) = (0, 0);
-    for seed in 0..1500 {
-        let (scene, view) = rubble(seed);
-        let (c, s) = attack(&scene, &view, random, 4, &format!("seed {seed}"));
-        covered += c;
-        shot += s;
-    }
+    let (covered, shot) = attack_all(1500, rubble, 4, 12);
     assert!(covered > 200_000 && shot > 800_000, "{covered} pixels, {shot} rays");
 }
 
@@ -304,26 +305,12 @@ fn bodies(seed: u64) -> (Scene, View) {
         let content = Content::Mesh(scene.meshes.len() as u32 - 1);
         scene.groups[0].push(Node { content, local, ..Node::default() });
     }
-    let size = (1 + random.below(120), 1 + random.below(120));
-    let reach = [3.0, 6.0, 30.0, 1.0][random.below(4) as usize];
-    let mut view = around(random, reach, size);
-    if random.one_in(3) {
-        view.projection =
-            Projection::Orthographic { half_height: random.between(1.0, 6.0), near: 0.05, far: 50.0 };
-    }
-    (scene, view)
+    (scene, some_view(random, 120, 30.0))
 }
 
 #[test]
 fn no_pixel_holds_more_than_is_there_on_convex_bodies() {
-    let random = &mut Random::new(21);
-    let (mut covered, mut shot) = (0, 0);
-    for seed in 0..3000 {
-        let (scene, view) = bodies(seed);
-        let (c, s) = attack(&scene, &view, random, 4, &format!("seed {seed}"));
-        covered += c;
-        shot += s;
-    }
+    let (covered, shot) = attack_all(3000, bodies, 4, 21);
     assert!(covered > 200_000 && shot > 800_000, "{covered} pixels, {shot} rays");
 }
 
