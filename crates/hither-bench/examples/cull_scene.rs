@@ -2,11 +2,11 @@
 //!
 //! ```sh
 //! cargo run --release -p hither-bench --example cull_scene -- FILE|world:SPEC WIDTH HEIGHT [sampled] [coherence] [coarse=N]
-//!     [occluder=PX] [piece=PX] [face=PX] [frames=N] [samples=N]
+//!     [occluder=PX] [piece=PX] [face=PX] [frames=N] [samples=N] [camera=NAME]
 //! ```
 //!
-//! The second line's are the thresholds of [`CullOptions`], how many frames are timed, and samples a pixel each way (4; 0
-//! for none).
+//! The second line's are the thresholds of [`CullOptions`], how many frames are timed, samples a pixel each way (4; 0
+//! for none), and the only camera.
 //!
 //! *Seen* are the instances that are nearest at a pixel's centre, and at one of 4×4 samples a pixel.
 
@@ -45,11 +45,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..default
     };
     let (samples, frames) = (number_of("samples", 4)?, number_of("frames", 30)?);
+    let only = arguments.iter().find_map(|a| a.strip_prefix("camera="));
     let index = SceneIndex::build(scene, &IndexOptions::default());
     let mut culler = Culler::new();
     culler.prepare(&index);
     println!("{:14} {:>8} {:>8} {:>8} {:>8}  missing", "camera", "ms", "visible", "seen", "4x4");
     for camera in 0..index.scene().cameras.len() {
+        if only.is_some_and(|name| index.scene().cameras[camera].name != name) {
+            continue;
+        }
         let view = index.scene().view(camera, size).ok_or("no camera")?;
         let mut times = Vec::new();
         let mut found = Default::default();

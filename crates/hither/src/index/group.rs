@@ -13,10 +13,9 @@ use super::{bvh, octree};
 use crate::scene::{Content, Group};
 use glam::DAffine3;
 
-/// An instance of a mesh or of another group.
+/// An instance of a mesh or of another group. Small: a walk that finds one hidden needs not know where it is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Item {
-    pub group_from_content: DAffine3,
     pub content: Content,
     /// Number of its first instance, counted from the group's first.
     pub first_instance: u32,
@@ -27,6 +26,8 @@ pub(crate) struct Item {
 #[derive(Debug, Default)]
 pub(crate) struct GroupIndex {
     pub items: Vec<Item>,
+    /// Of each item, where it is.
+    pub group_from_content: Vec<DAffine3>,
     pub resting: WideTree,
     pub moving: WideTree,
     kind: TreeKind,
@@ -74,8 +75,8 @@ impl GroupIndex {
                 if !placed.is_empty() {
                     primitives.push(Primitive::of_box(&placed, index.items.len() as u32));
                 }
+                index.group_from_content.push(world[n]);
                 index.items.push(Item {
-                    group_from_content: world[n],
                     content: node.content,
                     first_instance: first_instance as u32,
                     node: n as u32,
@@ -99,6 +100,7 @@ impl GroupIndex {
             m.poses.memory_bytes() + size_of_val(m.movers.as_slice()) + m.refit.memory_bytes()
         });
         size_of_val(self.items.as_slice())
+            + size_of_val(self.group_from_content.as_slice())
             + size_of_val(self.places.as_slice())
             + size_of_val(self.resting.nodes.as_slice())
             + size_of_val(self.moving.nodes.as_slice())
@@ -118,10 +120,10 @@ impl GroupIndex {
         let mut moved = Vec::new();
         let motion = match &mut self.motion {
             Some(motion) => {
-                let items = &mut self.items;
+                let (items, group_from_content) = (&self.items, &mut self.group_from_content);
                 motion.poses.follow(group, changed, |node, now| {
                     if let Ok(i) = items.binary_search_by_key(&(node as u32), |item| item.node) {
-                        items[i].group_from_content = *now;
+                        group_from_content[i] = *now;
                         moved.push(i as u32);
                     }
                 });
@@ -129,10 +131,10 @@ impl GroupIndex {
             }
             none => {
                 let poses = Poses::new(group);
-                for (i, item) in self.items.iter_mut().enumerate() {
+                for (i, (item, before)) in self.items.iter().zip(&mut self.group_from_content).enumerate() {
                     let now = poses.world(item.node as usize);
-                    if item.group_from_content != *now {
-                        item.group_from_content = *now;
+                    if before != now {
+                        *before = *now;
                         moved.push(i as u32);
                     }
                 }
@@ -141,8 +143,8 @@ impl GroupIndex {
         };
         moved.retain(|&i| self.places[i as usize].node != NOWHERE);
         let bounds_now = |i: u32| {
-            let item = &self.items[i as usize];
-            placed_bounds(&content_bounds(item.content), &item.group_from_content)
+            let i = i as usize;
+            placed_bounds(&content_bounds(self.items[i].content), &self.group_from_content[i])
         };
         let before = motion.movers.len();
         for &i in &moved {
@@ -183,12 +185,13 @@ impl GroupIndex {
                 for slot in (0..node.used as usize).filter(|&s| node.child[s] != Slot::EMPTY) {
                     let inner = match node.child[slot].child() {
                         Child::Leaf(i) => {
-                            let item = &self.items[i as usize];
-                            let place = self.places[i as usize];
+                            let i = i as usize;
+                            let place = self.places[i];
                             let found = (place.moves, place.node as usize, place.slot as usize);
                             assert_eq!(found, (moves, n, slot), "item {i} is looked for elsewhere");
-                            slots[i as usize] += 1;
-                            placed_bounds(&content_bounds(item.content), &item.group_from_content)
+                            slots[i] += 1;
+                            let bounds = content_bounds(self.items[i].content);
+                            placed_bounds(&bounds, &self.group_from_content[i])
                         }
                         Child::Node(c) => tree.nodes[c as usize].bounds(),
                     };
@@ -200,8 +203,8 @@ impl GroupIndex {
         for (i, item) in self.items.iter().enumerate() {
             let seen = usize::from(!content_bounds(item.content).is_empty());
             assert_eq!(slots[i], seen, "item {i} occurs {} times", slots[i]);
-            let now = world[item.node as usize];
-            assert!(item.group_from_content == now || now.is_nan(), "item {i} is out of place");
+            let (found, now) = (self.group_from_content[i], world[item.node as usize]);
+            assert!(found == now || now.is_nan(), "item {i} is out of place");
         }
     }
 }

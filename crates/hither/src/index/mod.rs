@@ -15,7 +15,7 @@ mod refit;
 mod tree;
 
 pub(crate) use boxes::tree_of_boxes;
-pub(crate) use group::GroupIndex;
+pub(crate) use group::{GroupIndex, Item};
 pub(crate) use mesh::{BlockTree, MeshIndex};
 pub(crate) use tree::{Box3, Child, Slot, WideNode, WideTree};
 
@@ -92,9 +92,10 @@ impl SceneIndex {
     pub(crate) fn descend(&self, instance: u32, mut visit: impl FnMut(&DAffine3)) -> Option<u32> {
         let (mut group, mut rest) = (self.scene.root, instance);
         loop {
-            let items = &self.groups[group as usize].items;
-            let item = items[..items.partition_point(|i| i.first_instance <= rest)].last()?;
-            visit(&item.group_from_content);
+            let GroupIndex { items, group_from_content, .. } = &self.groups[group as usize];
+            let place = items.partition_point(|i| i.first_instance <= rest).checked_sub(1)?;
+            let item = &items[place];
+            visit(&group_from_content[place]);
             rest -= item.first_instance;
             match item.content {
                 Content::Mesh(mesh) => return (rest == 0).then_some(mesh),

@@ -352,7 +352,8 @@ impl<'a> Walk<'a> {
         match c.space {
             Space::Group(group) => {
                 let item = &group.items[leaf as usize];
-                let (at, instance) = (c.at.after(&item.group_from_content), c.instance + item.first_instance);
+                let at = c.at.after(&group.group_from_content[leaf as usize]);
+                let instance = c.instance + item.first_instance;
                 self.enter(simd, target, item.content, at, instance);
             }
             Space::Mesh { blocks, mesh } => {

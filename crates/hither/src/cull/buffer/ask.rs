@@ -8,7 +8,8 @@
 //! on the side of *visible*.
 
 use crate::raster::{ScreenFromObject, axes, corner_sums, corners, largest, smallest};
-use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
+use fearless_simd::{Simd, prelude::*};
+use std::ops::Range;
 
 /// A transform made ready for boxes of its space.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +51,20 @@ pub(crate) struct BoxesOnScreen {
     pub uncut: u16,
 }
 
+impl BoxesOnScreen {
+    pub const NONE: BoxesOnScreen = BoxesOnScreen {
+        left: [0; 16],
+        top: [0; 16],
+        right: [0; 16],
+        bottom: [0; 16],
+        depth: [f32::INFINITY; 16],
+        farthest: [0.0; 16],
+        inside: 0,
+        clear: 0,
+        uncut: 0,
+    };
+}
+
 impl BoxView {
     pub fn new(at: &ScreenFromObject, width: u32, height: u32) -> BoxView {
         let pixels = |r: [f64; 4]| r.map(|c| (c / 256.0) as f32);
@@ -76,7 +91,6 @@ const SNAP: f32 = 1.0 / 256.0;
 /// Eight times half a unit in the last place, and a little for the rounding of the bound itself.
 const ROUNDING: f32 = 8.1 / (1 << 24) as f32;
 
-// long because its steps share sixteen boxes' worth of registers
 /// Projects boxes given as `min` and `max` (axis, lane).
 #[inline(always)]
 pub(crate) fn project<S: Simd>(
@@ -85,19 +99,55 @@ pub(crate) fn project<S: Simd>(
     min: &[[f32; 16]; 3],
     max: &[[f32; 16]; 3],
 ) -> BoxesOnScreen {
-    let (lo, hi) = (axes(simd, min, 0), axes(simd, max, 0));
-    let reach = reach(&lo, &hi);
-    let (x_error, y_error) = (error(&reach, &view.x), error(&reach, &view.y));
-    let (mut low, mut high) = ([f32x16::splat(simd, 0.0); 2], [f32x16::splat(simd, 0.0); 2]);
+    let mut boxes = BoxesOnScreen::NONE;
+    project_lanes(simd, view, [min, max], 0..16, &mut boxes);
+    boxes
+}
+
+/// Projects some of sixteen boxes into `boxes`; no others are inside. The first of them is the first of a register.
+///
+/// As many at once as a register holds: sixteen have more corners' coordinates than half as wide registers have room
+/// for, and many a node of a tree has no more than a few boxes.
+#[inline(always)]
+pub(crate) fn project_lanes<S: Simd>(
+    simd: S,
+    view: &BoxView,
+    [min, max]: [&[[f32; 16]; 3]; 2],
+    lanes: Range<u32>,
+    boxes: &mut BoxesOnScreen,
+) {
+    (boxes.inside, boxes.clear, boxes.uncut) = (0, 0, 0);
+    let (mut from, to) = (lanes.start as usize, lanes.end.min(16) as usize);
+    while from < to {
+        project_some(simd, view, [&axes(simd, min, from), &axes(simd, max, from)], from, boxes);
+        from += S::f32s::LEN;
+    }
+    boxes.inside &= ((1u32 << to) - (1 << (lanes.start & 15))) as u16;
+}
+
+// long because its steps share a register's worth of boxes
+/// Projects a register's worth of boxes, and puts them at lanes `from` and on.
+#[inline(always)]
+fn project_some<S: Simd>(
+    simd: S,
+    view: &BoxView,
+    [lo, hi]: [&[S::f32s; 3]; 2],
+    from: usize,
+    boxes: &mut BoxesOnScreen,
+) {
+    let splat = |v: f32| S::f32s::splat(simd, v);
+    let reach = reach::<S>(lo, hi);
+    let (x_error, y_error) = (error::<S>(&reach, &view.x), error::<S>(&reach, &view.y));
+    let (mut low, mut high) = ([splat(0.0); 2], [splat(0.0); 2]);
     let (least_w, w_error, depth, farthest, clear, mut inside);
     if view.perspective {
-        let (x, y) = (corner_sums(&view.x, &lo, &hi), corner_sums(&view.y, &lo, &hi));
-        let w = corner_sums(&view.w, &lo, &hi);
-        let (mut w_low, mut w_high) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 0.0));
+        let (x, y) = (corner_sums(&view.x, lo, hi), corner_sums(&view.y, lo, hi));
+        let w = corner_sums(&view.w, lo, hi);
+        let (mut w_low, mut w_high) = (splat(0.0), splat(0.0));
         for c in 0..8 {
             let (xy, z) = (c & 3, c >> 2);
             let w = w.0[xy] + w.1[z];
-            let reciprocal = f32x16::splat(simd, 1.0) / w;
+            let reciprocal = splat(1.0) / w;
             let (qx, qy) = ((x.0[xy] + x.1[z]) * reciprocal, (y.0[xy] + y.1[z]) * reciprocal);
             if c == 0 {
                 (low, high, w_low, w_high) = ([qx, qy], [qx, qy], w, w);
@@ -107,28 +157,31 @@ pub(crate) fn project<S: Simd>(
                 (w_low, w_high) = (w_low.min(w), w_high.max(w));
             }
         }
-        w_error = error(&reach, &view.w);
+        w_error = error::<S>(&reach, &view.w);
         least_w = w_low - w_error;
-        let near = f32x16::splat(simd, view.d[3] * 1.000_001);
+        let near = splat(view.d[3] * 1.000_001);
         clear = least_w.simd_gt(near) & least_w.simd_gt(w_error * 8.0);
         let most_w = w_high + w_error;
-        inside = most_w.simd_ge(f32x16::splat(simd, view.d[3] * 0.999_999 - view.margin[0]));
+        inside = most_w.simd_ge(splat(view.d[3] * 0.999_999 - view.margin[0]));
         depth = near / least_w * 1.000_001;
         farthest = near / most_w * 0.999_997;
     } else {
-        let d = corners(&view.d, &lo, &hi);
-        let d_error = error(&reach, &view.d);
-        (least_w, w_error) = (f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
+        let d = corners(&view.d, lo, hi);
+        let d_error = error::<S>(&reach, &view.d);
+        (least_w, w_error) = (splat(1.0), splat(0.0));
         depth = largest(&d) + d_error;
-        clear = depth.simd_le(f32x16::splat(simd, 1.0));
+        clear = depth.simd_le(splat(1.0));
         farthest = smallest(&d) - d_error;
-        inside = farthest.simd_le(f32x16::splat(simd, 1.0)) & depth.simd_gt(f32x16::splat(simd, 0.0));
-        let (x, y) = (corners(&view.x, &lo, &hi), corners(&view.y, &lo, &hi));
+        inside = farthest.simd_le(splat(1.0)) & depth.simd_gt(splat(0.0));
+        let (x, y) = (corners(&view.x, lo, hi), corners(&view.y, lo, hi));
         low = [smallest(&x), smallest(&y)];
         high = [largest(&x), largest(&y)];
     }
-    let ring = f32x16::splat(simd, view.margin[0] * view.margin[1] * 1.000_001) / least_w;
-    let mut rect = [f32x16::splat(simd, 0.0); 4];
+    let mut ring = splat(0.0);
+    if view.margin[0] > 0.0 {
+        ring = splat(view.margin[0] * view.margin[1] * 1.000_001) / least_w;
+    }
+    let mut rect = [splat(0.0); 4];
     let (mut within, mut uncut, mut certain) = (clear, clear, clear);
     for (k, (size, error)) in [(view.width, x_error), (view.height, y_error)].into_iter().enumerate() {
         let farthest = low[k].abs().max(high[k].abs());
@@ -136,54 +189,56 @@ pub(crate) fn project<S: Simd>(
         // A square touched in its border alone counts.
         let from = low[k] - margin - 1e-6;
         let to = high[k] + margin + 1e-6;
-        within &= from.simd_gt(f32x16::splat(simd, -8000.0)) & to.simd_lt(f32x16::splat(simd, 24000.0));
+        within &= from.simd_gt(splat(-8000.0)) & to.simd_lt(splat(24000.0));
         uncut &= from.simd_gt(ring) & to.simd_lt(ring * -1.0 + size);
         // Asked this way round, what is no number is seen.
         let unseen = from.simd_gt(ring + size) | to.simd_lt(ring * -1.0);
         inside &= !(unseen & clear);
-        let far = f32x16::splat(simd, 1e30);
+        let far = splat(1e30);
         certain &= from.abs().simd_lt(far) & to.abs().simd_lt(far);
         let (mut first, mut last) = (from.floor(), to.floor());
         if view.centres {
-            first = (from - (0.5 + SNAP)).ceil().max(f32x16::splat(simd, 0.0));
-            last = (to - (0.5 - SNAP)).floor().min(f32x16::splat(simd, size - 1.0));
+            first = (from - (0.5 + SNAP)).ceil().max(splat(0.0));
+            last = (to - (0.5 - SNAP)).floor().min(splat(size - 1.0));
             inside &= !(first.simd_gt(last) & clear);
         }
-        rect[k] = first.max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, size - 1.0));
-        rect[k + 2] = last.min(f32x16::splat(simd, size - 1.0)).max(f32x16::splat(simd, 0.0));
+        rect[k] = first.max(splat(0.0)).min(splat(size - 1.0));
+        rect[k + 2] = last.min(splat(size - 1.0)).max(splat(0.0));
     }
-    let mut inside_bits = inside.to_bitmask() as u16;
-    let clear_bits = clear.to_bitmask() as u16;
-    let crossing = inside_bits & !clear_bits;
+    let ordered = ordered::<S>(lo, hi);
+    let mut ordered_bits = ordered.to_bitmask() as u16;
+    let (mut inside_bits, clear_bits) = (inside.to_bitmask() as u16, clear.to_bitmask() as u16);
+    let crossing = inside_bits & !clear_bits & ordered_bits;
     if crossing != 0 {
-        inside_bits &= !(crossing & beyond_a_side(simd, view, &lo, &hi, [x_error, y_error]));
+        inside_bits &= !(crossing & beyond_a_side(simd, view, lo, hi));
     }
-    let ordered = if view.in_range { ordered(&lo, &hi).to_bitmask() as u16 } else { 0 };
-    let infinite = f32x16::splat(simd, f32::INFINITY);
-    let known = certain & mask32x16::from_bitmask(simd, u64::from(ordered));
-    BoxesOnScreen {
-        left: whole(rect[0]),
-        top: whole(rect[1]),
-        right: whole(rect[2]),
-        bottom: whole(rect[3]),
-        depth: known.select(depth, infinite).into(),
-        farthest: known.select(farthest, f32x16::splat(simd, 0.0)).into(),
-        // What is no box may be anywhere.
-        inside: inside_bits | !ordered,
-        clear: within.to_bitmask() as u16 & ordered,
-        uncut: uncut.to_bitmask() as u16 & ordered,
+    let mut known = certain & ordered;
+    if !view.in_range {
+        (ordered_bits, known) = (0, splat(0.0).simd_gt(splat(0.0)));
     }
+    let to = from + S::f32s::LEN;
+    rect[0].to_int::<S::i32s>().store_slice(&mut boxes.left[from..to]);
+    rect[1].to_int::<S::i32s>().store_slice(&mut boxes.top[from..to]);
+    rect[2].to_int::<S::i32s>().store_slice(&mut boxes.right[from..to]);
+    rect[3].to_int::<S::i32s>().store_slice(&mut boxes.bottom[from..to]);
+    known.select(depth, splat(f32::INFINITY)).store_slice(&mut boxes.depth[from..to]);
+    known.select(farthest, splat(0.0)).store_slice(&mut boxes.farthest[from..to]);
+    let lanes = (0xFFFFu32 >> (16 - S::f32s::LEN)) as u16;
+    // What is no box may be anywhere.
+    boxes.inside |= ((inside_bits | !ordered_bits) & lanes) << from;
+    boxes.clear |= (within.to_bitmask() as u16 & ordered_bits) << from;
+    boxes.uncut |= (uncut.to_bitmask() as u16 & ordered_bits) << from;
 }
 
 /// Largest magnitudes of the coordinates.
 #[inline(always)]
-fn reach<S: Simd>(lo: &[f32x16<S>; 3], hi: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
+fn reach<S: Simd>(lo: &[S::f32s; 3], hi: &[S::f32s; 3]) -> [S::f32s; 3] {
     [lo[0].abs().max(hi[0].abs()), lo[1].abs().max(hi[1].abs()), lo[2].abs().max(hi[2].abs())]
 }
 
 /// What a row's products with the corners may be off by.
 #[inline(always)]
-fn error<S: Simd>(reach: &[f32x16<S>; 3], r: &[f32; 4]) -> f32x16<S> {
+fn error<S: Simd>(reach: &[S::f32s; 3], r: &[f32; 4]) -> S::f32s {
     (reach[0] * r[0].abs() + reach[1] * r[1].abs() + reach[2] * r[2].abs() + r[3].abs()) * ROUNDING
 }
 
@@ -192,47 +247,111 @@ const FARTHEST: f32 = 1e15;
 
 /// Lanes whose corners are in order and not too far away.
 #[inline(always)]
-fn ordered<S: Simd>(lo: &[f32x16<S>; 3], hi: &[f32x16<S>; 3]) -> mask32x16<S> {
+fn ordered<S: Simd>(lo: &[S::f32s; 3], hi: &[S::f32s; 3]) -> S::mask32s {
     let mut good = lo[0].simd_le(hi[0]);
     for k in 0..3 {
-        let far = f32x16::splat(lo[k].token(), FARTHEST);
+        let far = S::f32s::splat(lo[k].token(), FARTHEST);
         good = good & lo[k].simd_le(hi[k]) & lo[k].simd_ge(far * -1.0) & hi[k].simd_le(far);
     }
     good
 }
 
-/// Boxes, crossing the near plane, that lie wholly beyond one of the image's sides (planes through the eye).
-#[inline(always)]
-fn beyond_a_side<S: Simd>(
-    simd: S,
-    view: &BoxView,
-    lo: &[f32x16<S>; 3],
-    hi: &[f32x16<S>; 3],
-    errors: [f32x16<S>; 2],
-) -> u16 {
+/// Boxes, crossing the near plane, that lie wholly beyond one of the image's sides (planes through the eye). Rarely
+/// asked, so that it finds everything again, in a function of its own: kept for it, it would take the registers of
+/// what is asked always.
+#[inline(never)]
+fn beyond_a_side<S: Simd>(simd: S, view: &BoxView, lo: &[S::f32s; 3], hi: &[S::f32s; 3]) -> u16 {
     if view.margin[0] > 0.0 {
         return 0;
     }
-    let one = f32x16::splat(simd, 1.0);
-    let w = if view.perspective { corners(&view.w, lo, hi) } else { [one; 8] };
-    let (x, y) = (corners(&view.x, lo, hi), corners(&view.y, lo, hi));
-    let w_error = error(&reach(lo, hi), &view.w);
-    let mut beyond = 0u16;
-    for (p, own, size) in [(&x, errors[0], view.width), (&y, errors[1], view.height)] {
-        for (bound, sign) in [(-0.01f32, 1.0f32), (size + 0.01, -1.0)] {
-            let slack = own + w_error * bound.abs();
-            let mut most = f32x16::splat(simd, f32::NEG_INFINITY);
-            for c in 0..8 {
-                most = most.max((p[c] - w[c] * bound) * sign);
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let w = if view.perspective { corners(&view.w, lo, hi) } else { [S::f32s::splat(simd, 1.0); 8] };
+            let (x, y) = (corners(&view.x, lo, hi), corners(&view.y, lo, hi));
+            let reach = reach::<S>(lo, hi);
+            let w_error = error::<S>(&reach, &view.w);
+            let errors = [error::<S>(&reach, &view.x), error::<S>(&reach, &view.y)];
+            let mut beyond = 0u16;
+            for (p, own, size) in [(&x, errors[0], view.width), (&y, errors[1], view.height)] {
+                for (bound, sign) in [(-0.01f32, 1.0f32), (size + 0.01, -1.0)] {
+                    let slack = own + w_error * bound.abs();
+                    let mut most = S::f32s::splat(simd, f32::NEG_INFINITY);
+                    for c in 0..8 {
+                        most = most.max((p[c] - w[c] * bound) * sign);
+                    }
+                    // Twice the bound, for the rounding of the difference itself.
+                    beyond |= most.simd_lt(slack * -2.0).to_bitmask() as u16;
+                }
             }
-            // Twice the bound, for the rounding of the difference itself.
-            beyond |= most.simd_lt(slack * -2.0).to_bitmask() as u16;
-        }
-    }
-    beyond
+            beyond
+        },
+    )
 }
 
-#[inline(always)]
-fn whole<S: Simd>(v: f32x16<S>) -> [i32; 16] {
-    v.to_int::<fearless_simd::i32x16<S>>().into()
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::levels;
+    use crate::reference::trouble::{self, Random};
+    use fearless_simd::dispatch;
+
+    /// Boxes about the origin, some of which are none.
+    fn boxes(random: &mut Random) -> [[[f32; 16]; 3]; 2] {
+        let mut sides = [[[0.0; 16]; 3]; 2];
+        let [min, max] = &mut sides;
+        for (min, max) in min.as_flattened_mut().iter_mut().zip(max.as_flattened_mut()) {
+            let (middle, size) = (random.between(-4.0, 4.0), [0.01, 0.5, 20.0][random.below(3) as usize]);
+            let none = if random.one_in(40) { -1.0 } else { 1.0 };
+            (*min, *max) = ((middle - size * none) as f32, (middle + size * none) as f32);
+        }
+        sides
+    }
+
+    #[inline(always)]
+    fn project_eights<S: Simd>(
+        simd: S,
+        view: &BoxView,
+        [min, max]: &[[[f32; 16]; 3]; 2],
+        used: u32,
+    ) -> [BoxesOnScreen; 2] {
+        let all = project(simd, view, min, max);
+        let at_once = S::f32s::LEN.max(8) as u32;
+        let mut some = BoxesOnScreen::NONE;
+        let (mut inside, mut uncut) = (0, 0);
+        for from in (0..used).step_by(at_once as usize) {
+            project_lanes(simd, view, [min, max], from..used.min(from + at_once), &mut some);
+            (inside, uncut) = (inside | some.inside, uncut | some.uncut);
+        }
+        (some.inside, some.uncut) = (inside, uncut);
+        [all, some]
+    }
+
+    #[test]
+    fn some_boxes_are_where_they_are_among_all() {
+        let random = &mut Random::new(3);
+        let mut seen = 0;
+        for seed in 0..300 {
+            let camera = trouble::view(seed);
+            let at = ScreenFromObject::of_view(&camera);
+            let mut view = BoxView::new(&at, camera.width, camera.height);
+            view.centres = random.one_in(3);
+            view.margin = if random.one_in(3) { [0.1, 100.0] } else { [0.0; 2] };
+            let (sides, used) = (boxes(random), random.below(17));
+            for level in levels() {
+                let [all, some] = dispatch!(level, simd => project_eights(simd, &view, &sides, used));
+                assert_eq!(some.inside, all.inside & ((1u32 << used) - 1) as u16, "seed {seed}, {used}");
+                for lane in (0..16).filter(|lane| some.inside >> lane & 1 == 1) {
+                    let of = |b: &BoxesOnScreen| {
+                        let depths = [b.depth[lane], b.farthest[lane]].map(f32::to_bits);
+                        let rect = [b.left[lane], b.top[lane], b.right[lane], b.bottom[lane]];
+                        (rect, depths, b.uncut >> lane & 1)
+                    };
+                    assert_eq!(of(&some), of(&all), "seed {seed}, lane {lane} of {used}");
+                    seen += 1;
+                }
+            }
+        }
+        assert!(seen > 1000, "{seen}");
+    }
 }

@@ -88,7 +88,7 @@ mod sampled;
 mod shared;
 mod surface;
 
-pub(super) use ask::{BoxView, project};
+pub(super) use ask::{BoxView, BoxesOnScreen, project_lanes};
 pub(super) use draw::Band;
 pub use occluder::{Occluder, OccluderError, Sides};
 pub use queries::{Ball, Boxes, PlacedMesh, ScreenRect};

@@ -4,7 +4,7 @@
 //! draw what hid something last time, what hid most first
 //! walk the index nearest first:
 //!     a box that the buffer hides, or that is outside: drop it, with all that is in it
-//!     a box that is too small to hold an occluder: put it aside
+//!     boxes of a node that are too small to hold an occluder: put them aside
 //!     an instance: if one of the boxes of its mesh's tree shows, it may be seen;
 //!                  if it is large enough, draw its opaque surfaces at once, so that they hide what is behind
 //! now that everything is drawn:
@@ -26,8 +26,7 @@
 //! *Tried, and not kept.* Occluders by the area-angle of their surfaces [Coorg & Teller 1996], summed over each mesh for
 //! the three axes, against that of the box around it, instead of by the box alone: 2 to 7 % fewer faces at 0.6 % more
 //! instances found in a market of 22,000 parts, and nothing in an office of open modules, of which each covers as much
-//! as the threshold asks. Lists of what the walk needs of instances, apart from their transforms, and no look inside
-//! meshes of a single box: no difference beyond what one run differs from the next.
+//! as the threshold asks. No look inside meshes of a single box: no difference beyond what one run differs from the next.
 
 mod walk;
 
@@ -123,7 +122,7 @@ pub struct Judged {
 /// What culling did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CullCounters {
-    /// Boxes of trees that were projected.
+    /// Boxes of trees that were projected; of meshes' trees by eights, until one shows.
     pub boxes_projected: u64,
     /// Boxes that were asked about.
     pub boxes_asked: u64,

@@ -1,12 +1,13 @@
 //! The nearest-first walk of a scene's nested trees that draws occluders and drops what they hide.
 
 use super::{Before, CullCounters, CullOptions, Culling, Hid, Judged, Reason};
-use crate::cull::buffer::{Band, BoxView, Drawn, Frame, Occluder, project};
-use crate::index::{Child, GroupIndex, SceneIndex, Slot, WideNode, WideTree};
+use crate::cull::buffer::{Band, BoxView, BoxesOnScreen, Drawn, Frame, Occluder, project_lanes};
+use crate::index::{Child, GroupIndex, Item, SceneIndex, Slot, WideNode};
 use crate::raster::ScreenFromObject;
 use crate::scene::Content;
-use fearless_simd::Simd;
+use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 use std::collections::{BinaryHeap, HashMap, HashSet};
+use std::ops::Range;
 
 /// A mesh's box of so many pixels is worth one more question about the boxes inside.
 const PX_A_BOX: u32 = 4;
@@ -24,27 +25,53 @@ struct Context<'a> {
     first: u32,
 }
 
-/// A child of a group's tree that the view may show.
+/// A node of a group's trees.
+#[derive(Clone, Copy)]
+struct Place {
+    context: u32,
+    moving: bool,
+    node: u32,
+}
+
+/// A child of a node that the view may show.
 #[derive(Clone, Copy)]
 struct Open {
+    parent: Place,
+    slot: Slot,
     /// No point of it is nearer, and none is farther.
     nearest: f32,
     farthest: f32,
-    slot: Slot,
-    context: u32,
-    moving: bool,
     rect: [i32; 4],
     /// Whether no border of the picture cuts it, for any eye that may come.
     whole: bool,
 }
 
 impl Open {
+    #[inline(always)]
+    fn new(parent: Place, slot: Slot, boxes: &BoxesOnScreen, lane: usize) -> Open {
+        Open {
+            parent,
+            slot,
+            nearest: boxes.depth[lane],
+            farthest: boxes.farthest[lane],
+            rect: [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]],
+            whole: boxes.uncut >> lane & 1 == 1,
+        }
+    }
+
     /// Pixels in the rectangle around it; as many as can be, where it may reach the near plane.
     #[inline(always)]
     fn pixels(&self) -> u32 {
         let [left, top, right, bottom] = self.rect;
         if self.nearest < f32::INFINITY { ((right - left + 1) * (bottom - top + 1)) as u32 } else { u32::MAX }
     }
+}
+
+/// Children of a node that are too small to hold an occluder.
+struct Small {
+    parent: Place,
+    boxes: BoxesOnScreen,
+    lanes: u16,
 }
 
 /// What is to be looked at, the nearest first; of what is equally near, what was found first.
@@ -114,7 +141,12 @@ struct Walk<'a> {
     /// What may hold an occluder.
     queue: Queue,
     /// What is too small for that, in no order. Looked at when everything is drawn.
-    aside: Vec<Open>,
+    aside: Vec<Small>,
+    /// Nodes whose children are to be looked at before anything else, the last first.
+    entered: Vec<Place>,
+    /// Where the boxes of such a node are, and those of a node of a mesh's tree.
+    boxes: BoxesOnScreen,
+    part_boxes: BoxesOnScreen,
     everything_is_drawn: bool,
     seen: Vec<Seen>,
     /// Instances that may be seen, below the complement of the bits of their depth.
@@ -151,6 +183,9 @@ pub(super) fn cull<S: Simd>(
         contexts: Vec::new(),
         queue: Queue::default(),
         aside: Vec::new(),
+        entered: Vec::new(),
+        boxes: BoxesOnScreen::NONE,
+        part_boxes: BoxesOnScreen::NONE,
         everything_is_drawn: false,
         seen: Vec::new(),
         visible: Vec::new(),
@@ -167,19 +202,18 @@ pub(super) fn cull<S: Simd>(
             walk.drawn.insert(instance);
         }
     }
-    walk.enter(simd, index.scene().root, frame.screen_from_world, 0);
-    while let Some(open) = walk.queue.pop() {
+    walk.enter(index.scene().root, frame.screen_from_world, 0);
+    loop {
+        walk.visit_entered(simd);
+        let Some(open) = walk.queue.pop() else { break };
         walk.look_at(simd, &open);
     }
     walk.everything_is_drawn = true;
     walk.ask_again(simd);
-    let small = std::mem::take(&mut walk.aside);
-    for open in &small {
-        walk.look_at(simd, open);
-        // What is inside it.
-        while let Some(open) = walk.aside.pop() {
-            walk.look_at(simd, &open);
-        }
+    for small in std::mem::take(&mut walk.aside) {
+        walk.boxes = small.boxes;
+        walk.look_at_lanes(simd, small.parent, small.lanes);
+        walk.visit_entered(simd);
     }
     walk.finish()
 }
@@ -188,97 +222,188 @@ impl<'a> Walk<'a> {
     /// Drops what is hidden, and opens what is not.
     #[inline(always)]
     fn look_at<S: Simd>(&mut self, simd: S, open: &Open) {
-        self.counters.boxes_asked += 1;
-        if self.is_hidden(simd, open) {
-            self.counters.boxes_hidden += 1;
-            self.credit(open.rect);
-            self.judge(open.context, open.slot, open.moving, Reason::BoxHidden);
+        if self.drops(simd, open) {
             return;
         }
         match open.slot.child() {
-            Child::Node(node) => self.visit(simd, open.context, open.moving, node),
-            Child::Leaf(item) => self.visit_item(simd, open, item),
+            Child::Node(node) => self.entered.push(Place { node, ..open.parent }),
+            Child::Leaf(at) => {
+                let item = self.contexts[open.parent.context as usize].group.items[at as usize];
+                self.visit_item(simd, open, at, item, self.is_speck(open) || self.is_behind(open));
+            }
         }
+    }
+
+    /// As [`Walk::look_at`] for several children of a node, whose boxes were just projected.
+    #[inline(always)]
+    fn look_at_lanes<S: Simd>(&mut self, simd: S, parent: Place, lanes: u16) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let (node, group) = (self.node(parent), self.contexts[parent.context as usize].group);
+                // Leaves that are not hidden; of these, those that show as a whole.
+                let (mut leaves, mut wholes) = (0u16, 0u16);
+                for lane in bits(lanes) {
+                    let slot = node.child[lane];
+                    if slot == Slot::EMPTY {
+                        continue;
+                    }
+                    let open = Open::new(parent, slot, &self.boxes, lane);
+                    // What nothing is before is not hidden.
+                    let behind = matches!(slot.child(), Child::Leaf(_)) && self.is_behind(&open);
+                    if behind {
+                        self.counters.boxes_asked += 1;
+                    } else if self.drops(simd, &open) {
+                        continue;
+                    }
+                    match slot.child() {
+                        Child::Node(node) => self.entered.push(Place { node, ..parent }),
+                        Child::Leaf(_) => {
+                            leaves |= 1 << lane;
+                            wholes |= u16::from(behind || self.is_speck(&open)) << lane;
+                        }
+                    }
+                }
+                let items = self.fetch(group, node, leaves, wholes);
+                for lane in bits(leaves) {
+                    let Child::Leaf(at) = node.child[lane].child() else { continue };
+                    let open = Open::new(parent, node.child[lane], &self.boxes, lane);
+                    self.visit_item(simd, &open, at, items[lane], wholes >> lane & 1 == 1);
+                }
+            },
+        );
+    }
+
+    /// The items of several lanes of a node. Has what is needed of them, and lies anywhere, read from memory at the
+    /// same time, where one after the other would be waited for.
+    #[inline(always)]
+    fn fetch(&self, group: &GroupIndex, node: &WideNode, leaves: u16, wholes: u16) -> [Item; 16] {
+        let mut items = [Item { content: Content::Nothing, first_instance: 0, node: 0 }; 16];
+        let mut read = 0.0;
+        for lane in bits(leaves) {
+            if let Child::Leaf(at) = node.child[lane].child() {
+                items[lane] = group.items[at as usize];
+            }
+        }
+        for lane in bits(leaves & !wholes) {
+            let (Child::Leaf(at), Content::Mesh(mesh)) = (node.child[lane].child(), items[lane].content)
+            else {
+                continue;
+            };
+            let place = &group.group_from_content[at as usize];
+            read += (place.matrix3.x_axis.x + place.translation.z) as f32;
+            if let Some(root) = self.index.meshes[mesh as usize].solid.tree.nodes.first() {
+                let WideNode { min: [a, b, c], max: [d, e, f], .. } = root;
+                read += (a[0] + b[0]) + (c[0] + d[0]) + (e[0] + f[0]) + root.used as f32;
+            }
+        }
+        // Nobody wants the sum: what it read is near when it is needed.
+        std::hint::black_box(read);
+        items
+    }
+
+    /// Asks about a box; whether it is hidden.
+    #[inline(always)]
+    fn drops<S: Simd>(&mut self, simd: S, open: &Open) -> bool {
+        self.counters.boxes_asked += 1;
+        let hidden = self.is_hidden(simd, open);
+        if hidden {
+            self.counters.boxes_hidden += 1;
+            self.credit(open.rect);
+            self.judge(open.parent, open.slot, Reason::BoxHidden);
+        }
+        hidden
+    }
+
+    /// Whether an instance's box is so small that the smaller ones in it are not asked about.
+    #[inline(always)]
+    fn is_speck(&self, open: &Open) -> bool {
+        open.pixels() <= PX_OF_A_SPECK
+    }
+
+    /// Whether nothing is before an instance's box yet, which is no speck: the smaller ones in it would show as it does.
+    #[inline(always)]
+    fn is_behind(&self, open: &Open) -> bool {
+        open.whole && !self.is_speck(open) && self.band.is_behind(open.rect, open.farthest)
     }
 
     /// Opens a group's trees.
     #[inline(always)]
-    fn enter<S: Simd>(&mut self, simd: S, group: u32, at: ScreenFromObject, first: u32) {
+    fn enter(&mut self, group: u32, at: ScreenFromObject, first: u32) {
         let group = &self.index.groups[group as usize];
         let context = self.contexts.len() as u32;
         let boxes = self.frame.box_view(&at);
         self.contexts.push(Context { group, at, boxes, first });
-        for (tree, moving) in [(&group.resting, false), (&group.moving, true)] {
+        for (tree, moving) in [(&group.moving, true), (&group.resting, false)] {
             if !tree.nodes.is_empty() {
-                self.visit(simd, context, moving, 0);
+                self.entered.push(Place { context, moving, node: 0 });
             }
         }
     }
 
     #[inline(always)]
-    fn visit<S: Simd>(&mut self, simd: S, context: u32, moving: bool, node: u32) {
-        let c = &self.contexts[context as usize];
-        let tree: &'a WideTree = if moving { &c.group.moving } else { &c.group.resting };
-        let node = &tree.nodes[node as usize];
-        let view = c.boxes;
-        let wide;
-        let (min, max) = match self.frame.moves() {
-            false => (&node.min, &node.max),
-            true => {
-                wide = self.frame.widened(&node.min, &node.max, &c.at);
-                (&wide.0, &wide.1)
-            }
-        };
-        let boxes = simd.vectorize(
-            #[inline(always)]
-            || project(simd, &view, min, max),
-        );
+    fn node(&self, place: Place) -> &'a WideNode {
+        let group: &'a GroupIndex = self.contexts[place.context as usize].group;
+        let tree = if place.moving { &group.moving } else { &group.resting };
+        &tree.nodes[place.node as usize]
+    }
+
+    #[inline(always)]
+    fn visit_entered<S: Simd>(&mut self, simd: S) {
+        while let Some(place) = self.entered.pop() {
+            self.visit(simd, place);
+        }
+    }
+
+    /// Finds where the children of a node are, and looks at them: at once if everything is drawn, else later.
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, simd: S, place: Place) {
+        let node = self.node(place);
+        let c = &self.contexts[place.context as usize];
+        let moved = widened(self.frame, node, &c.at);
+        let sides = moved.as_ref().map_or([&node.min, &node.max], |[min, max]| [min, max]);
+        project(simd, &c.boxes, sides, 0..node.used, &mut self.boxes);
         self.counters.boxes_projected += u64::from(node.used);
-        for lane in 0..node.used as usize {
-            if node.child[lane] == Slot::EMPTY {
-                continue;
+        let inside = self.boxes.inside;
+        if self.options.reasons {
+            let outside = |lane: &usize| inside >> lane & 1 == 0 && node.child[*lane] != Slot::EMPTY;
+            for lane in (0..node.used as usize).filter(outside) {
+                self.judge(place, node.child[lane], Reason::OutsideView);
             }
-            if boxes.inside >> lane & 1 == 0 {
-                self.judge(context, node.child[lane], moving, Reason::OutsideView);
-                continue;
-            }
-            let open = Open {
-                nearest: boxes.depth[lane],
-                farthest: boxes.farthest[lane],
-                slot: node.child[lane],
-                context,
-                moving,
-                rect: [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]],
-                whole: boxes.uncut >> lane & 1 == 1,
-            };
-            if self.everything_is_drawn || open.pixels() < self.least.occluder_px {
-                self.aside.push(open);
-            } else {
-                self.queue.push(open);
+        }
+        if self.everything_is_drawn {
+            return self.look_at_lanes(simd, place, inside);
+        }
+        let lanes = inside & smaller(simd, &self.boxes, self.least.occluder_px);
+        if lanes != 0 {
+            self.aside.push(Small { parent: place, boxes: self.boxes, lanes });
+        }
+        for lane in bits(inside & !lanes) {
+            if node.child[lane] != Slot::EMPTY {
+                self.queue.push(Open::new(place, node.child[lane], &self.boxes, lane));
             }
         }
     }
 
+    /// Opens an item, `number` of its group, that is not hidden.
     #[inline(always)]
-    fn visit_item<S: Simd>(&mut self, simd: S, open: &Open, item: u32) {
-        let c = &self.contexts[open.context as usize];
-        let (item, group_at) = (&c.group.items[item as usize], c.at);
-        let pixels = open.pixels();
-        let instance = c.first + item.first_instance;
+    fn visit_item<S: Simd>(&mut self, simd: S, open: &Open, number: u32, item: Item, as_a_whole: bool) {
+        let c = &self.contexts[open.parent.context as usize];
+        let group_from_content = &c.group.group_from_content[number as usize];
+        let (pixels, instance) = (open.pixels(), c.first + item.first_instance);
         if let Content::Mesh(mesh) = item.content
-            && open.nearest < f32::INFINITY
-            && (pixels <= PX_OF_A_SPECK || open.whole && self.band.is_behind(open.rect, open.farthest))
+            && as_a_whole
         {
-            // Nothing is before it yet: its smaller boxes would show like its own.
+            let at = (self.draws(pixels) && pixels > PX_OF_A_SPECK).then(|| c.at.after(group_from_content));
             self.take_for_visible(open, instance, Reason::Shows);
-            if self.draws(pixels) && pixels > PX_OF_A_SPECK {
-                self.draw(simd, instance, mesh, group_at.after(&item.group_from_content));
+            if let Some(at) = at {
+                self.draw(simd, instance, mesh, at);
             }
             return;
         }
-        let at = group_at.after(&item.group_from_content);
+        let at = c.at.after(group_from_content);
         let mesh = match item.content {
-            Content::Group(group) => return self.enter(simd, group, at, instance),
+            Content::Group(group) => return self.enter(group, at, instance),
             Content::Mesh(mesh) => mesh,
             Content::Nothing => return,
         };
@@ -329,7 +454,7 @@ impl<'a> Walk<'a> {
     #[inline(always)]
     fn draw<S: Simd>(&mut self, simd: S, instance: u32, mesh: u32, at: ScreenFromObject) {
         let occluder = &self.occluders[mesh as usize];
-        if occluder.is_empty() || self.drawn.contains(&instance) {
+        if occluder.is_empty() || !self.drawn.is_empty() && self.drawn.contains(&instance) {
             return;
         }
         if !self.idle.is_empty() && self.idle.contains_key(&instance) {
@@ -379,7 +504,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Why a node of a mesh's tree shows for certain, as far as boxes can say; its children that may show, but have
-    /// children themselves, go onto the stack, the nearest last.
+    /// children themselves, go onto the stack, the nearest last. By eights: often one of the first shows.
     #[inline(always)]
     fn node_shows<S: Simd>(
         &mut self,
@@ -389,51 +514,64 @@ impl<'a> Walk<'a> {
         at: &ScreenFromObject,
         inside: &mut bool,
     ) -> Option<Reason> {
-        let wide;
-        let (min, max) = match self.frame.moves() {
-            false => (&node.min, &node.max),
-            true => {
-                wide = self.frame.widened(&node.min, &node.max, at);
-                (&wide.0, &wide.1)
+        let moved = widened(self.frame, node, at);
+        let sides = moved.as_ref().map_or([&node.min, &node.max], |[min, max]| [min, max]);
+        let mut order = Order { first: self.stack.len(), depths: [0.0; 16] };
+        let at_once = S::f32s::LEN.max(8) as u32;
+        for from in (0..node.used).step_by(8) {
+            if from % at_once == 0 {
+                let lanes = from..node.used.min(from + at_once);
+                project(simd, view, sides, lanes, &mut self.part_boxes);
             }
-        };
-        let boxes = simd.vectorize(
-            #[inline(always)]
-            || project(simd, view, min, max),
-        );
-        self.counters.boxes_projected += u64::from(node.used);
-        let first = self.stack.len();
-        let mut depths = [0.0; 16];
-        let mut rest = u32::from(boxes.inside) & (0xFFFF >> (16 - node.used));
-        while rest != 0 {
-            let lane = rest.trailing_zeros() as usize & 15;
-            rest &= rest - 1;
-            if node.child[lane] == Slot::EMPTY {
-                continue;
+            self.counters.boxes_projected += u64::from(node.used.min(from + 8) - from);
+            for lane in bits(self.part_boxes.inside & 0xFF << from) {
+                if node.child[lane] == Slot::EMPTY {
+                    continue;
+                }
+                *inside = true;
+                let shows = self.part_shows(simd, view, node.child[lane], lane, &mut order);
+                if shows.is_some() {
+                    return shows;
+                }
             }
-            *inside = true;
-            if boxes.depth[lane] == f32::INFINITY {
-                return Some(Reason::ReachesNearPlane);
-            }
-            if view.margin[0] > 0.0 && boxes.uncut >> lane & 1 == 0 {
-                return Some(Reason::Shows);
-            }
-            self.counters.boxes_asked += 1;
-            let rect = [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]];
-            if self.band.hides(simd, rect, boxes.depth[lane]) {
-                self.counters.boxes_hidden += 1;
-                self.credit(rect);
-                continue;
-            }
-            let Child::Node(child) = node.child[lane].child() else { return Some(Reason::Shows) };
-            let mut to = self.stack.len();
-            self.stack.push(child);
-            depths[to - first] = boxes.depth[lane];
-            while to > first && depths[to - first - 1] > depths[to - first] {
-                self.stack.swap(to, to - 1);
-                depths.swap(to - first, to - first - 1);
-                to -= 1;
-            }
+        }
+        None
+    }
+
+    /// Why one of the boxes of a mesh's tree that were just projected shows for certain.
+    #[inline(always)]
+    fn part_shows<S: Simd>(
+        &mut self,
+        simd: S,
+        view: &BoxView,
+        slot: Slot,
+        lane: usize,
+        order: &mut Order,
+    ) -> Option<Reason> {
+        let boxes = &self.part_boxes;
+        let nearest = boxes.depth[lane];
+        if nearest == f32::INFINITY {
+            return Some(Reason::ReachesNearPlane);
+        }
+        if view.margin[0] > 0.0 && boxes.uncut >> lane & 1 == 0 {
+            return Some(Reason::Shows);
+        }
+        self.counters.boxes_asked += 1;
+        let rect = [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]];
+        if self.band.hides(simd, rect, nearest) {
+            self.counters.boxes_hidden += 1;
+            self.credit(rect);
+            return None;
+        }
+        let Child::Node(child) = slot.child() else { return Some(Reason::Shows) };
+        let Order { first, depths } = order;
+        let mut to = self.stack.len();
+        self.stack.push(child);
+        depths[to - *first] = nearest;
+        while to > *first && depths[to - *first - 1] > depths[to - *first] {
+            self.stack.swap(to, to - 1);
+            depths.swap(to - *first, to - *first - 1);
+            to -= 1;
         }
         None
     }
@@ -469,12 +607,12 @@ impl<'a> Walk<'a> {
     }
 
     /// Notes the reason for everything below a slot.
-    fn judge(&mut self, context: u32, slot: Slot, moving: bool, reason: Reason) {
+    fn judge(&mut self, parent: Place, slot: Slot, reason: Reason) {
         if !self.options.reasons {
             return;
         }
-        let c = &self.contexts[context as usize];
-        let tree = if moving { &c.group.moving } else { &c.group.resting };
+        let c = &self.contexts[parent.context as usize];
+        let tree = if parent.moving { &c.group.moving } else { &c.group.resting };
         let mut stack = vec![slot];
         while let Some(slot) = stack.pop() {
             match slot.child() {
@@ -496,11 +634,63 @@ impl<'a> Walk<'a> {
     }
 }
 
+/// Where some boxes are.
+#[inline(always)]
+fn project<S: Simd>(
+    simd: S,
+    view: &BoxView,
+    sides: [&[[f32; 16]; 3]; 2],
+    lanes: Range<u32>,
+    boxes: &mut BoxesOnScreen,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || project_lanes(simd, view, sides, lanes, boxes),
+    );
+}
+
+/// The boxes of a node as far as what is in them may move, if anything may.
+#[inline(always)]
+fn widened(frame: &Frame, node: &WideNode, at: &ScreenFromObject) -> Option<[[[f32; 16]; 3]; 2]> {
+    frame.moves().then(|| frame.widened(&node.min, &node.max, at).into())
+}
+
+/// The lanes whose bits are set.
+#[inline(always)]
+fn bits(mut mask: u16) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(
+        #[inline(always)]
+        move || {
+            let lane = mask.trailing_zeros() as usize & 15;
+            let some = mask != 0;
+            mask &= mask.wrapping_sub(1);
+            some.then_some(lane)
+        },
+    )
+}
+
+/// Which boxes cover fewer pixels; none that may reach the near plane.
+#[inline(always)]
+fn smaller<S: Simd>(simd: S, boxes: &BoxesOnScreen, px: u32) -> u16 {
+    let load = |side: &[i32; 16]| i32x16::from_slice(simd, side);
+    let width = load(&boxes.right) - load(&boxes.left) + 1;
+    let height = load(&boxes.bottom) - load(&boxes.top) + 1;
+    let small = (width * height).simd_lt(px.min(i32::MAX as u32) as i32);
+    let beyond = f32x16::from_slice(simd, &boxes.depth).simd_lt(f32::INFINITY);
+    (small & beyond).to_bitmask() as u16
+}
+
 /// Sorts instances: the nearest is the smallest; of what is equally near, that with the smaller number.
 #[inline(always)]
 fn key(nearest: f32, instance: u32) -> u64 {
     // Depths that are 0 or more are ordered as their bits are.
     u64::from(!nearest.to_bits()) << 32 | u64::from(instance)
+}
+
+/// How near the children of a node are that went onto the stack, from `first` on.
+struct Order {
+    first: usize,
+    depths: [f32; 16],
 }
 
 enum Shows {

@@ -65,13 +65,13 @@ proptest! {
             let mut index = SceneIndex::build(scene.clone(), &IndexOptions { tree });
             let mut moved_once = vec![false; count];
             for _ in 0..moves {
-                let before: Vec<DAffine3> = index.groups[0].items.iter().map(|i| i.group_from_content).collect();
+                let before = index.groups[0].group_from_content.clone();
                 let moved = index.set_transform(random.below(count) as u32, somewhere(random));
                 index.validate();
                 let group = &index.groups[0];
                 let mut elsewhere = 0;
-                for (item, before) in group.items.iter().zip(before) {
-                    if item.group_from_content != before && item.content == Content::Mesh(0) {
+                for (i, item) in group.items.iter().enumerate() {
+                    if group.group_from_content[i] != before[i] && item.content == Content::Mesh(0) {
                         elsewhere += 1;
                         moved_once[item.node as usize] = true;
                     }
