@@ -2,7 +2,7 @@
 //!
 //! ```sh
 //! cargo run --release -p hither-bench --example cull_scene -- FILE|world:SPEC WIDTH HEIGHT [sampled] [coherence] [coarse=N]
-//!     [occluder=PX] [piece=PX] [face=PX] [frames=N] [samples=N] [camera=NAME]
+//!     [occluder=PX] [piece=PX] [face=PX] [pays=FACES] [frames=N] [samples=N] [camera=NAME]
 //! ```
 //!
 //! The second line's are the thresholds of [`CullOptions`], how many frames are timed, samples a pixel each way (4; 0
@@ -42,6 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         least_occluder_px: number_of("occluder", default.least_occluder_px)?,
         least_piece_px: number_of("piece", default.least_piece_px)?,
         least_px_a_face: number_of("face", default.least_px_a_face)?,
+        faces_a_hidden_box: number_of("pays", default.faces_a_hidden_box)?,
         ..default
     };
     let (samples, frames) = (number_of("samples", 4)?, number_of("frames", 30)?);
@@ -49,7 +50,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let index = SceneIndex::build(scene, &IndexOptions::default());
     let mut culler = Culler::new();
     culler.prepare(&index);
-    println!("{:14} {:>8} {:>8} {:>8} {:>8}  missing", "camera", "ms", "visible", "seen", "4x4");
+    println!(
+        "{:14} {:>8} {:>8} {:>8} {:>8} {:>8}  missing",
+        "camera", "ms", "least", "visible", "seen", "4x4"
+    );
     for camera in 0..index.scene().cameras.len() {
         if only.is_some_and(|name| index.scene().cameras[camera].name != name) {
             continue;
@@ -70,9 +74,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         let visible: HashSet<u32> = found.visible.iter().copied().collect();
         let truth = if sampled { &at_centres } else { &finer };
         println!(
-            "{:14} {:8.2} {:8} {:8} {:8}  {}; {:?}",
+            "{:14} {:8.2} {:8.2} {:8} {:8} {:8}  {}; {:?}",
             index.scene().cameras[camera].name,
             times[times.len() / 2],
+            times[0],
             visible.len(),
             at_centres.len(),
             finer.len(),

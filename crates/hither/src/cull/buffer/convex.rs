@@ -27,7 +27,8 @@ use super::fine::plane_of;
 use super::loose::tile_plane;
 use super::occluder::{ENDS, Face, Vertices};
 use super::place::Placed;
-use super::surface::{COLUMNS, Surface, TilePlane};
+use super::surface::Surface;
+use super::tile::{COLUMNS, TilePlane};
 use fearless_simd::{Simd, f32x8, f32x16, i32x16, mask32x16, prelude::*};
 use glam::DVec3;
 

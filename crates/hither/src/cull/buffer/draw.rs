@@ -1,10 +1,10 @@
 //! Drawing an occluder into a band of the image: the walk of its patches, nearest first, and each patch.
 
 use super::Drawn;
-use super::ask::{BoxView, project};
+use super::ask::{BoxView, BoxesOnScreen, project_lanes};
 use super::clip::{self, Clipped, EdgeOf, clip, doubled_area};
 use super::convex::{self, Bounds};
-use super::fill::{Corner, Joint, Outline, fill, first_pixel, last_pixel};
+use super::fill::{Corner, Goes, Joint, Outline, fill, first_pixel, last_pixel};
 use super::loose::{LooseFaces, Sixteen, fill_one, set_up};
 use super::mosaic::{Area, Drawing, Mosaic};
 use super::occluder::{ENDS, Face, Occluder, Patch};
@@ -31,6 +31,8 @@ pub(in crate::cull) struct Band {
     loose: Box<Sixteen>,
     mosaic: Mosaic,
     bounds: Bounds,
+    /// The children of a node.
+    boxes: Box<BoxesOnScreen>,
     open: BinaryHeap<Open>,
 }
 
@@ -102,6 +104,7 @@ impl Band {
             loose: Box::default(),
             mosaic: Mosaic::default(),
             bounds: Bounds::default(),
+            boxes: Box::new(BoxesOnScreen::NONE),
             open: BinaryHeap::new(),
         }
     }
@@ -216,14 +219,15 @@ impl Band {
         if lanes == 0 {
             return;
         }
-        let boxes = simd.vectorize(
+        simd.vectorize(
             #[inline(always)]
-            || project(simd, &standing.boxes, &node.min, &node.max),
+            || project_lanes(simd, &standing.boxes, [&node.min, &node.max], 0..node.used, &mut self.boxes),
         );
-        let mut rest = u32::from(boxes.inside) & lanes;
+        let mut rest = u32::from(self.boxes.inside) & lanes;
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize;
             rest &= rest - 1;
+            let boxes = &self.boxes;
             let rect = [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]];
             let clear = boxes.clear >> lane & 1 == 1;
             let extent = (rect[2] - rect[0]).min(rect[3] - rect[1]);
@@ -289,9 +293,11 @@ impl Band {
                 slack: placing.slack,
                 rect,
             };
-            drawn.patches += 1;
-            drawn.faces += self.mosaic.draw(simd, &mut self.surface, &drawing);
-            return;
+            if let Some(faces) = self.mosaic.draw(simd, &mut self.surface, &drawing) {
+                drawn.patches += 1;
+                drawn.faces += faces;
+                return;
+            }
         }
         let faces = &standing.occluder.faces[patch.first_face as usize..][..patch.faces as usize];
         self.clipped.clear();
@@ -313,7 +319,8 @@ impl Band {
                 return;
             }
         }
-        self.fill_faces(simd, faces, placing.slack, margin_px > 0);
+        let goes = if margin_px > 0 { Goes::Jointly } else { Goes::Apart };
+        self.fill_faces(simd, faces, placing.slack, goes);
         if margin_px > 0 {
             self.joint.finish_eroded(simd, &mut self.surface, self.placed.nearest, margin_px);
         } else {
@@ -417,7 +424,7 @@ impl Band {
         self.mosaic.end(simd, &mut self.surface, &area, self.placed.nearest);
     }
 
-    /// Takes a face for the mosaic. A large one is filled by itself, too: where it covers whole pixels, what is farther
+    /// Takes a face for the mosaic. A large one is filled by itself, too: where it covers whole blocks, what is farther
     /// of its patch does not count.
     #[inline(never)]
     fn face_of_mosaic<S: Simd>(&mut self, simd: S, area: &Area, outline: Outline, slack: i32) {
@@ -428,7 +435,7 @@ impl Band {
             || {
                 mosaic.face(simd, area, &outline.corner, outline.corners == 4);
                 if outline.is_large() {
-                    fill(simd, surface, joint, &outline, slack, nearest, false);
+                    fill(simd, surface, joint, &outline, slack, nearest, Goes::InBlocks);
                 }
             },
         );
@@ -436,7 +443,7 @@ impl Band {
 
     /// Fills the faces of a patch, whose turns are known and whose corners are placed or clipped.
     #[inline(always)]
-    fn fill_faces<S: Simd>(&mut self, simd: S, faces: &[Face], slack: i32, jointly: bool) {
+    fn fill_faces<S: Simd>(&mut self, simd: S, faces: &[Face], slack: i32, goes: Goes) {
         let (surface, joint, nearest) = (&mut self.surface, &mut self.joint, self.placed.nearest);
         // Those that were clipped come in the order of the faces.
         let mut next = 0;
@@ -449,7 +456,7 @@ impl Band {
             let corner = self.placed.corners(&face.corner);
             if self.clipped.get(next).is_none_or(|c| c.0 != f as u32) {
                 let outline = Outline { corner, corners: usize::from(face.corners), turn, ends };
-                fill(simd, surface, joint, &outline, slack, nearest, jointly);
+                fill(simd, surface, joint, &outline, slack, nearest, goes);
                 continue;
             }
             let pieces = self.clipped[next].1;
@@ -460,7 +467,7 @@ impl Band {
                     if face.corners == 3 { ends } else { ends_of_half(ends, p, pieces[1 - p].is_none()) };
                 for i in 1..piece.len - 1 {
                     let outline = of_fan(piece, i, turn, ends);
-                    fill(simd, surface, joint, &outline, slack, nearest, jointly);
+                    fill(simd, surface, joint, &outline, slack, nearest, goes);
                 }
             }
         }
@@ -562,6 +569,9 @@ impl Band {
     }
 }
 
+/// So many faces of a convex body take as long as one that is drawn by itself, more or less.
+const FACES_OF_A_BODY_FOR_ONE: i64 = 16;
+
 /// Smaller boxes hide too little for what it takes to place them.
 const PX_A_FACE_OF_A_BOX: i32 = 32;
 
@@ -569,12 +579,14 @@ const PX_A_FACE_OF_A_BOX: i32 = 32;
 /// inside of it. None stands for its faces; `None` for a patch that is not worth drawing.
 #[inline(always)]
 fn bodies<'a>(standing: &Standing<'a>, patch: &'a Patch, open: &Open, pixels: i64) -> Option<&'a [Patch]> {
-    let worth = |faces: u32| pixels >= i64::from(faces) * i64::from(standing.px_a_face);
+    let wanted = i64::from(patch.faces) * i64::from(standing.px_a_face);
     // Bodies are drawn whole, beyond the near plane, and for one eye. It is outside of the bounding box, then.
     let whole = open.clear && !standing.plain && standing.margin.is_none();
-    if worth(patch.faces) {
-        let itself = whole && patch.convex.is_some();
-        return Some(if itself { std::slice::from_ref(patch) } else { &[] });
+    if whole && patch.convex.is_some() && pixels * FACES_OF_A_BODY_FOR_ONE >= wanted {
+        return Some(std::slice::from_ref(patch));
+    }
+    if pixels >= wanted {
+        return Some(&[]);
     }
     let inner = &standing.occluder.inner[patch.inner.start as usize..patch.inner.end as usize];
     // Three faces of a box are seen.

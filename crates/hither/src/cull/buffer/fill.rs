@@ -3,11 +3,12 @@
 //!
 //! ```text
 //! face     plane of depth, lowered until it is below every corner; edges as functions of pixels
-//! small    (up to 16×16 pixels, with an edge shared) into the joint, row by row
-//! large    tile by tile: outside; wholly inside, a plane; else the edges that cross the tile, row by row:
-//!            pixels wholly inside  → the surface
-//!            pixels touched        → the joint, if an edge that crosses the tile is shared
-//! patch    the joint: pixels whose count is at least one get the least depth of all faces that touch them
+//! small    (up to 16×16 pixels, with an edge shared) into the joint
+//! large    tile by tile: outside; wholly inside, a plane; else the edges that cross the tile:
+//!            all of them ends   → pixels wholly inside, row by row, to the surface
+//!            one of them shared → blocks wholly inside to the surface, what is touched into the joint
+//! joint    blocks touched take the least depth; pixels, row by row, count how often they are covered
+//! patch    of the joint the pixels whose count is at least one get the least depth of all faces that touch their block
 //! ```
 //!
 //! Where all pixels that a face may touch in a tile hold more than the patch's nearest depth already, the face is left
@@ -18,7 +19,8 @@
 //! rule exactly. A pixel's square, widened by the slack, reaches `h = (|A| + |B|)·(128 + slack)` from there.
 
 use super::loose::tile_plane;
-use super::surface::{Row, Surface, TilePlane};
+use super::surface::Surface;
+use super::tile::{Row, TilePlane, blocks_in};
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
 /// A corner on the screen: 1/256 pixel, and a depth that is no larger than the true one.
@@ -84,15 +86,14 @@ const NO_ROOM: u32 = u32::MAX;
 
 #[derive(Clone, Debug)]
 struct JointTile {
-    /// Least depth of the faces that touch a pixel.
-    depth: [Row; 16],
+    /// Least depth of the faces that touch a block.
+    depth: Row,
     /// How often the faces cover its centre, less what may be lost on the way to its other points.
     count: [Counts; 16],
 }
 
 impl JointTile {
-    const EMPTY: JointTile =
-        JointTile { depth: [Row([f32::INFINITY; 16]); 16], count: [Counts([0; 16]); 16] };
+    const EMPTY: JointTile = JointTile { depth: Row([f32::INFINITY; 16]), count: [Counts([0; 16]); 16] };
 }
 
 impl Joint {
@@ -123,25 +124,16 @@ impl Joint {
         for place in 0..self.dirty.len() {
             let tile = self.dirty[place] as usize;
             self.place[tile] = NO_ROOM;
-            let gains = surface.tile_min(tile) < nearest;
             let joint = &mut self.pool[place];
-            let mut wrote = false;
-            for row in 0..16 {
-                let whole = i32x16::from_slice(simd, &joint.count[row].0).simd_ge(one);
-                if gains && whole.any_true() {
-                    if !wrote {
-                        surface.open(simd, tile);
-                        wrote = true;
-                    }
-                    let depth = f32x16::from_slice(simd, &joint.depth[row].0);
-                    surface.raise(simd, tile, row as i32, depth, whole);
+            if surface.tile_min(tile) < nearest {
+                let mut covered = [0; 16];
+                for (row, covered) in joint.count.iter().zip(&mut covered) {
+                    *covered = i32x16::from_slice(simd, &row.0).simd_ge(one).to_bitmask() as u16;
                 }
-                i32x16::splat(simd, 0).store_slice(&mut joint.count[row].0);
-                f32x16::splat(simd, f32::INFINITY).store_slice(&mut joint.depth[row].0);
+                let depth = f32x16::from_slice(simd, &joint.depth.0);
+                surface.raise_covered(simd, tile, &covered, depth, nearest);
             }
-            if wrote {
-                surface.raised(tile, nearest);
-            }
+            *joint = JointTile::EMPTY;
         }
         self.dirty.clear();
     }
@@ -166,7 +158,7 @@ impl Joint {
             for row in 0..16 {
                 for column in 0..16 {
                     if joint.count[row].0[column] >= 1 {
-                        depths[at + row * width + column] = joint.depth[row].0[column];
+                        depths[at + row * width + column] = joint.depth.0[(row & 12) | (column >> 2)];
                     }
                 }
             }
@@ -407,8 +399,19 @@ impl Edge {
     }
 }
 
+/// Where what a face covers goes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Goes {
+    /// To the surface, but into the joint what shared edges cross.
+    Apart,
+    /// All into the joint: the patch is to be eroded.
+    Jointly,
+    /// To the surface what it covers of whole blocks; the rest is drawn in another way.
+    InBlocks,
+}
+
 /// Fills one convex face of a patch no point of which is nearer than `patch_nearest`. `slack` is how far a corner may
-/// be from its true place, 1/256 pixel. Where the patch is to be eroded, all of it goes `jointly`.
+/// be from its true place, 1/256 pixel.
 #[inline(always)]
 pub(super) fn fill<S: Simd>(
     simd: S,
@@ -417,7 +420,7 @@ pub(super) fn fill<S: Simd>(
     outline: &Outline,
     slack: i32,
     patch_nearest: f32,
-    jointly: bool,
+    goes: Goes,
 ) {
     let mut face = Face::new(outline, slack, surface.top, patch_nearest);
     let [left, top, right, bottom] = face.around;
@@ -425,7 +428,7 @@ pub(super) fn fill<S: Simd>(
         return;
     }
     let edges = (1 << outline.corners) - 1;
-    let all_end = !jointly && outline.ends & edges == edges;
+    let all_end = goes != Goes::Jointly && outline.ends & edges == edges;
     if all_end && (right - left < 2 || bottom - top < 2) {
         // It touches at most two columns or rows; one that covers a pixel touches its neighbours too.
         return;
@@ -446,7 +449,7 @@ pub(super) fn fill<S: Simd>(
         face.set_plane();
         simd.vectorize(
             #[inline(always)]
-            || fill_tiles(simd, surface, joint, &face, jointly),
+            || fill_tiles(simd, surface, joint, &face, goes),
         );
     }
 }
@@ -476,7 +479,6 @@ fn fill_small<S: Simd, const N: usize>(simd: S, surface: &Surface, joint: &mut J
     }
     for tile_x in x0 >> 4..=x1 >> 4 {
         let x = tile_x * 16;
-        let plane = face.tile_plane(x, top);
         for tile_y in y0 >> 4..=y1 >> 4 {
             let tile = surface.tile(tile_x, tile_y);
             if !surface.may_gain(simd, tile, face.within(x, tile_y * 16), face.patch_nearest) {
@@ -487,7 +489,8 @@ fn fill_small<S: Simd, const N: usize>(simd: S, surface: &Surface, joint: &mut J
             for k in 0..N {
                 first[k] = at_first[k] + edges[k].a * (x - (x0 & !15)) + edges[k].b * (rows[0] - y0);
             }
-            let place = Place { tile, x, rows, columns: column_bits(x0 - x, x1 - x), plane_top: top };
+            let place = Place { tile, x, rows, columns: column_bits(x0 - x, x1 - x) };
+            let plane = face.tile_plane(x, tile_y * 16);
             into_joint::<S, N>(simd, joint, face, &edges, first, numbers, place, plane);
         }
     }
@@ -500,9 +503,47 @@ struct Place {
     x: i32,
     rows: [i32; 2],
     columns: u64,
-    /// Row from which the plane counts.
-    plane_top: i32,
 }
+
+impl Place {
+    /// First and last column and row of the tile (inclusive).
+    #[inline(always)]
+    fn within(&self) -> [i32; 4] {
+        let [left, right] =
+            [self.columns.trailing_zeros() as i32 & 15, 63 - (self.columns | 1).leading_zeros() as i32];
+        [left, self.rows[0] & 15, right, self.rows[1] & 15]
+    }
+
+    /// No part of a face in one of the tile's blocks is farther.
+    #[inline(always)]
+    fn depth<S: Simd>(&self, simd: S, face: &Face, plane: TilePlane) -> f32x16<S> {
+        plane.block_mins(simd, self.within()).max(f32x16::splat(simd, face.farthest))
+    }
+}
+
+/// Blocks of a tile in which every edge is 0 or more at the first pixel, if so much is added. `first` is what they are at
+/// the place's first pixel.
+#[inline(always)]
+fn blocks_where<S: Simd, const N: usize>(
+    simd: S,
+    edges: &[Edge; N],
+    first: [i32; N],
+    place: Place,
+    add: impl Fn(&Edge) -> i32,
+) -> mask32x16<S> {
+    let (column, row) = (i32x16::from_slice(simd, &BLOCK_COLUMNS), i32x16::from_slice(simd, &BLOCK_ROWS));
+    let zero = i32x16::splat(simd, 0);
+    let mut outside = zero;
+    for k in 0..N {
+        let e = first[k] - edges[k].b * (place.rows[0] & 15) + add(&edges[k]);
+        outside |= column * edges[k].a + row * edges[k].b + e;
+    }
+    outside.simd_ge(zero)
+}
+
+/// First column, and first row, of each block of a tile.
+const BLOCK_COLUMNS: [i32; 16] = [0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 12];
+const BLOCK_ROWS: [i32; 16] = [0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12];
 
 /// Adds a face to the joint. `edges` are those of its edges that matter there, called `numbers`, which are
 /// `first` at the first pixel.
@@ -521,33 +562,31 @@ fn into_joint<S: Simd, const N: usize>(
     let zero = i32x16::splat(simd, 0);
     let column = columns_i32(simd);
     let mut e = [zero; N];
-    let mut touch_by = [zero; N];
     let mut end = [End::default(); N];
     let mut any_end = false;
     for k in 0..N {
         e[k] = column * edges[k].a + first[k];
-        touch_by[k] = i32x16::splat(simd, edges[k].touch);
         if edges[k].ends {
             any_end = true;
             end[k] = face.end(numbers[k]);
         }
     }
     let columns = mask32x16::from_bitmask(simd, place.columns);
-    let farthest = f32x16::splat(simd, face.farthest);
     let one = i32x16::splat(simd, 1);
     let joint = joint.tile(place.tile);
+    let [x0, y0, x1, y1] = place.within().map(|px| px >> 2);
+    let around = mask32x16::from_bitmask(simd, u64::from(blocks_in([x0, y0, x1, y1])));
+    let touched =
+        blocks_where::<S, N>(simd, edges, first, place, |e| (e.a.max(0) + e.b.max(0)) * 3 + e.touch);
+    let touched = touched & around;
+    let old = f32x16::from_slice(simd, &joint.depth.0);
+    touched.select(old.min(place.depth(simd, face, plane)), old).store_slice(&mut joint.depth.0);
     for y in place.rows[0]..=place.rows[1] {
-        let (mut centre, mut touch) = (zero, zero);
-        for k in 0..N {
-            centre |= e[k];
-            touch |= e[k] + touch_by[k];
+        let mut centre = zero;
+        for e in &e {
+            centre |= *e;
         }
-        let touched = touch.simd_ge(zero) & columns;
         let row = (y & 15) as usize;
-        let depths = &mut joint.depth[row].0;
-        let old = f32x16::from_slice(simd, depths);
-        let depth = plane.row(simd, y - place.plane_top).max(farthest);
-        touched.select(old.min(depth), old).store_slice(depths);
         let counts = &mut joint.count[row].0;
         let covered = centre.simd_ge(zero) & columns;
         let mut count = i32x16::from_slice(simd, counts);
@@ -585,7 +624,8 @@ struct Crossed {
 }
 
 #[inline(always)]
-fn fill_tiles<S: Simd>(simd: S, surface: &mut Surface, joint: &mut Joint, face: &Face, jointly: bool) {
+fn fill_tiles<S: Simd>(simd: S, surface: &mut Surface, joint: &mut Joint, face: &Face, goes: Goes) {
+    let jointly = goes == Goes::Jointly;
     let [left, top, right, bottom] = face.around;
     let (left, top) = (left.max(0) >> 4, top.max(0) >> 4);
     let (right, bottom) = (right.min(surface.width - 1) >> 4, bottom.min(surface.height - 1) >> 4);
@@ -632,11 +672,11 @@ fn fill_tiles<S: Simd>(simd: S, surface: &mut Surface, joint: &mut Joint, face: 
                 continue;
             }
             match crossed.count {
-                0 => fill_tile::<S, 0>(simd, surface, joint, face, &edges, crossed, plane, jointly),
-                1 => fill_tile::<S, 1>(simd, surface, joint, face, &edges, crossed, plane, jointly),
-                2 => fill_tile::<S, 2>(simd, surface, joint, face, &edges, crossed, plane, jointly),
-                3 => fill_tile::<S, 3>(simd, surface, joint, face, &edges, crossed, plane, jointly),
-                _ => fill_tile::<S, 4>(simd, surface, joint, face, &edges, crossed, plane, jointly),
+                0 => fill_tile::<S, 0>(simd, surface, joint, face, &edges, crossed, plane, goes),
+                1 => fill_tile::<S, 1>(simd, surface, joint, face, &edges, crossed, plane, goes),
+                2 => fill_tile::<S, 2>(simd, surface, joint, face, &edges, crossed, plane, goes),
+                3 => fill_tile::<S, 3>(simd, surface, joint, face, &edges, crossed, plane, goes),
+                _ => fill_tile::<S, 4>(simd, surface, joint, face, &edges, crossed, plane, goes),
             }
         }
     }
@@ -652,7 +692,7 @@ fn fill_tile<S: Simd, const N: usize>(
     all: &[Edge; 4],
     crossed: Crossed,
     plane: TilePlane,
-    jointly: bool,
+    goes: Goes,
 ) {
     let Crossed { tile, x, y, numbers, .. } = crossed;
     let mut edges = [Edge::default(); N];
@@ -661,43 +701,39 @@ fn fill_tile<S: Simd, const N: usize>(
     }
     let [left, top, right, bottom] = face.around;
     let (y0, y1) = (top.max(y), bottom.min(y + 15).min(surface.height - 1));
-    if crossed.shared || jointly {
-        let columns = column_bits(left - x, right - x);
-        let place = Place { tile, x, rows: [y0, y1], columns, plane_top: y };
-        let mut first = [0; N];
-        for k in 0..N {
-            first[k] = edges[k].at_saturated(x, y0);
-        }
+    let place = Place { tile, x, rows: [y0, y1], columns: column_bits(left - x, right - x) };
+    let mut first = [0; N];
+    for k in 0..N {
+        first[k] = edges[k].at_saturated(x, y0);
+    }
+    if goes != Goes::InBlocks && (crossed.shared || goes == Goes::Jointly) {
         into_joint::<S, N>(simd, joint, face, &edges, first, numbers, place, plane);
     }
-    if jointly || !surface.may_gain(simd, tile, face.within(x, y), face.nearest) {
+    if goes == Goes::Jointly || !surface.may_gain(simd, tile, face.within(x, y), face.nearest) {
+        return;
+    }
+    if crossed.shared || goes == Goes::InBlocks {
+        // The rest of what the face covers, its patch does.
+        let inside =
+            blocks_where::<S, N>(simd, &edges, first, place, |e| (e.a.min(0) + e.b.min(0)) * 3 - e.inside);
+        let depth = place.depth(simd, face, plane);
+        surface.raise_blocks(simd, tile, inside.to_bitmask() as u32, depth, face.nearest);
         return;
     }
     let zero = i32x16::splat(simd, 0);
     let column = columns_i32(simd);
     let mut e = [zero; N];
     for k in 0..N {
-        e[k] = column * edges[k].a + (edges[k].at_saturated(x, y0) - edges[k].inside);
+        e[k] = column * edges[k].a + (first[k] - edges[k].inside);
     }
-    let farthest = f32x16::splat(simd, face.farthest);
-    let mut wrote = false;
-    for row in y0 - y..=y1 - y {
+    let mut covered = [0; 16];
+    for row in &mut covered[(y0 - y) as usize..=(y1 - y) as usize] {
         let mut outside = zero;
         for k in 0..N {
             outside |= e[k];
             e[k] += edges[k].b;
         }
-        let inside = outside.simd_ge(zero);
-        if inside.any_true() {
-            if !wrote {
-                surface.open(simd, tile);
-                wrote = true;
-            }
-            let depth = plane.row(simd, row).max(farthest);
-            surface.raise(simd, tile, row, depth, inside);
-        }
+        *row = outside.simd_ge(zero).to_bitmask() as u16;
     }
-    if wrote {
-        surface.raised(tile, face.nearest);
-    }
+    surface.raise_covered(simd, tile, &covered, place.depth(simd, face, plane), face.nearest);
 }

@@ -16,7 +16,8 @@
 
 use super::occluder::{Face, Patch, Vertices};
 use super::place::{Placing, ROUND, Sizes, dot};
-use super::surface::{COLUMNS, Surface, TilePlane};
+use super::surface::Surface;
+use super::tile::{COLUMNS, TilePlane};
 use crate::index::{Child, Slot, WideTree};
 use crate::raster::{GUARD_MAX, GUARD_MIN, ScreenFromObject};
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*};

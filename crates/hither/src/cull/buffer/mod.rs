@@ -39,7 +39,9 @@
 //! *Depth.* Every face of the chain that may touch the square, widened by δ, takes part in the minimum. Of a
 //! face, the plane through three snapped corners is lowered until it is below every true corner. A true point
 //! of the face is a mean of true corners, hence not below the plane there; within a pixel and δ the plane falls
-//! by at most `(|a| + |b|)·(½ + δ)`.
+//! by at most `(|a| + |b|)·(½ + δ)`. Where several faces cover pixels together, the minimum is taken over blocks of
+//! 4×4: over all faces that may touch the block, and of each over all of the block within the rectangle around the face.
+//! So each pixel's faces are among them, and none is taken for nearer than it is.
 //!
 //! *Cutting* at the near plane and at the guard band replaces the chain by another with the same cut points for
 //! both owners of an edge; what the near plane cuts ends there.
@@ -51,7 +53,8 @@
 //! beyond the near plane, where it lies inside all edges of the silhouette ([`convex`]). In a patch of faces that are not large
 //! N(c) is counted from the outline alone, and each face lowers depth in the whole rectangle around it, to its plane
 //! or to its farthest corner ([`mosaic`]). Else each face is filled, and only pixels that shared edges cross are
-//! counted ([`fill`]).
+//! counted ([`fill`]). In both, whole blocks that are covered raise one number, and only what is covered in part raises
+//! pixels.
 //!
 //! What of a closed patch is not worth drawing may still hide by boxes that lie inside of it ([`inner`]): from outside
 //! the patch's bounding box, what such a box hides, the patch hides.
@@ -87,6 +90,7 @@ mod queries;
 mod sampled;
 mod shared;
 mod surface;
+mod tile;
 
 pub(super) use ask::{BoxView, BoxesOnScreen, project_lanes};
 pub(super) use draw::Band;

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! 1. which faces turn to the eye: sixteen planes at a time
-//! 2. depth: each face that is drawn lowers the pixels of the rectangle around it to its plane, where that is nearer
-//!    than its farthest corner; to that corner if the face is but a few pixels large
+//! 2. depth: each face that is drawn lowers the blocks of 4×4 pixels that the rectangle around it meets to its plane,
+//!    where that is nearer than its farthest corner; to that corner if the face is but a few pixels large
 //! 3. the outline: edges between faces that are drawn and faces that are not, or that turn the other way
 //! 4. the count of each pixel: going down a column of pixel centres, the outline's edges that are crossed, each
 //!    +1 or −1; less one where an edge of the outline touches the pixel with its centre on the inner side
@@ -14,13 +14,15 @@
 //! ends: the count needs to know no more.
 //!
 //! *Depth.* A face's plane, lowered as in [`fill`](super::fill), is nowhere above the face in a pixel that the face
-//! touches. In the other pixels of the rectangle it stands for nothing and can only lower what is there.
+//! touches. In the other pixels of the rectangle, and of the blocks, it stands for nothing and can only lower what is
+//! there.
 //!
 //! *Count.* How many faces of a chain cover a point, each with the sign of its turn, is how often the chain's
 //! boundary winds around the point, and that is the sum of the boundary's crossings with a ray. So step 4
 //! yields the N(c) of [`super`] without looking at a face, for any choice in step 1: an outline around what is
 //! taken is all that it needs. What step 1 takes for a front and is none counts with its true sign, and only
-//! lessens the count.
+//! lessens the count. A row changes a pixel's count by 2 for an edge at most, and all rows together by 3: sixteen bits
+//! hold it for [`MOST_EDGES`].
 //!
 //! *Ties.* Crossings are taken as if every centre were moved by (ε, ε²), which is what the fill rule says:
 //! columns from an edge's smallest x (inclusive) to its largest (exclusive), and a point on an edge inside if the
@@ -35,8 +37,9 @@ use super::fine::FinePatch;
 use super::loose::tile_plane;
 use super::place::{Placed, ROUND};
 use super::surface::Surface;
+use super::tile::blocks_in;
 use crate::raster::ScreenFromObject;
-use fearless_simd::{Simd, f32x16, f64x8, i32x4, i32x16, mask32x16, prelude::*, u64x8};
+use fearless_simd::{Simd, f32x16, f64x4, i16x16, i32x4, i32x16, mask32x16, prelude::*, u64x4};
 
 /// The eye in the space of an occluder: a point (1 at the end), or the direction towards it (0).
 pub(super) fn eye_in_object(at: &ScreenFromObject) -> [f32; 4] {
@@ -67,18 +70,23 @@ pub(super) struct Drawing<'a> {
     pub rect: [i32; 4],
 }
 
-/// Sixteen pixels of a row.
+/// The blocks of a tile.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-struct Sixteen([i32; 16]);
+struct Blocks([i32; 16]);
 
-/// Pixels around a patch, sixteen columns after another, and in them row after row.
+/// Sixteen pixels of a row.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+struct Steps([i16; 16]);
+
+/// Tiles around a patch, sixteen columns after another.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Mosaic {
-    /// Bits of the least depth of the faces that may touch a pixel.
-    depth: Vec<Sixteen>,
-    /// By how much a pixel's count differs from that of the pixel above.
-    step: Vec<Sixteen>,
+    /// Bits of the least depth of the faces that may touch a block, tile by tile downwards.
+    depth: Vec<Blocks>,
+    /// By how much a pixel's count differs from that of the pixel above, row by row.
+    step: Vec<Steps>,
     /// Turn of each face: 1 front, −1 back, 0 not drawn; and one more 0, for where the surface ends.
     turn: Vec<i8>,
     /// Edges at which what is drawn ends: the corners, in the order of the face, and its turn on the screen.
@@ -92,10 +100,12 @@ pub(super) struct Area {
     rect: [i32; 4],
     /// Image row of the surface's first.
     band: i32,
-    /// First column, a multiple of sixteen.
+    /// First column and row of the first tile.
     left: i32,
-    /// Rows of the rectangle.
+    top: i32,
+    /// Rows from there to the rectangle's last, and the tiles that they meet.
     rows: usize,
+    tiles: usize,
     /// How far a corner may be from its true place, 1/256 pixel.
     slack: i32,
 }
@@ -106,6 +116,9 @@ impl Area {
         self.rows + 1
     }
 }
+
+/// A patch with more edges in its outline is not drawn: counts might not fit.
+const MOST_EDGES: usize = 10_000;
 
 /// A face that touches no more pixels each way has its farthest corner for a plane: it is as good a bound.
 const FEW_PX: i32 = 4;
@@ -124,25 +137,27 @@ fn plane_of<S: Simd>(corners: [i32x4<S>; 4], four: bool, slack: i32) -> [f64; 3]
 const NO_DEPTH: i32 = i32::MAX;
 
 impl Mosaic {
-    /// Draws a patch. Returns how many faces were drawn.
+    /// Draws a patch. Returns how many faces were drawn; nothing, if its outline is too long.
     #[inline(always)]
-    pub fn draw<S: Simd>(&mut self, simd: S, surface: &mut Surface, drawing: &Drawing) -> u64 {
+    pub fn draw<S: Simd>(&mut self, simd: S, surface: &mut Surface, drawing: &Drawing) -> Option<u64> {
         let &Drawing { patch, placed, eye, front_sign, slack, rect } = drawing;
         let area = self.begin(surface, rect, slack);
         self.take_turns(simd, &patch, eye);
         let drawn = self.lower_depths(simd, &area, &patch, placed, front_sign);
-        self.end(simd, surface, &area, placed.nearest);
-        drawn
+        self.end(simd, surface, &area, placed.nearest).then_some(drawn)
     }
 
     /// Makes room for a patch that touches no pixels but those of a rectangle of the surface.
     pub fn begin(&mut self, surface: &Surface, rect: [i32; 4], slack: i32) -> Area {
-        let left = rect[0] & !15;
-        let area = Area { rect, band: surface.top, left, rows: (rect[3] - rect[1] + 1) as usize, slack };
-        let size = area.stride() * (((rect[2] - left) >> 4) + 1) as usize;
-        if self.depth.len() < size {
-            self.depth.resize(size, Sixteen([NO_DEPTH; 16]));
-            self.step.resize(size, Sixteen([0; 16]));
+        let (left, top) = (rect[0] & !15, rect[1] & !15);
+        let rows = (rect[3] - top + 1) as usize;
+        let area = Area { rect, band: surface.top, left, top, rows, tiles: rows.div_ceil(16), slack };
+        let across = (((rect[2] - left) >> 4) + 1) as usize;
+        if self.step.len() < area.stride() * across {
+            self.step.resize(area.stride() * across, Steps([0; 16]));
+        }
+        if self.depth.len() < area.tiles * across {
+            self.depth.resize(area.tiles * across, Blocks([NO_DEPTH; 16]));
         }
         self.outline.clear();
         area
@@ -161,14 +176,16 @@ impl Mosaic {
         self.outline.push((from.bits(), to.bits(), turn));
     }
 
-    /// Draws the patch whose faces and edges were taken.
+    /// Draws the patch whose faces and edges were taken; or says that there are too many edges.
     #[inline(always)]
-    pub fn end<S: Simd>(&mut self, simd: S, surface: &mut Surface, area: &Area, nearest: f32) {
-        for at in 0..self.outline.len() {
+    pub fn end<S: Simd>(&mut self, simd: S, surface: &mut Surface, area: &Area, nearest: f32) -> bool {
+        let fits = self.outline.len() <= MOST_EDGES;
+        for at in 0..if fits { self.outline.len() } else { 0 } {
             let (p, q, turn) = self.outline[at];
             self.count_edge(simd, area, p, q, turn);
         }
         self.finish(simd, surface, area, nearest);
+        fits
     }
 
     #[inline(always)]
@@ -192,7 +209,7 @@ impl Mosaic {
         }
     }
 
-    // long because its steps share the registers of eight columns
+    // long because its steps share the registers of four columns
     /// Counts an edge of the outline, that runs around a face of `turn`, in the columns that it touches.
     #[inline(always)]
     fn count_edge<S: Simd>(&mut self, simd: S, area: &Area, p: [i32; 4], q: [i32; 4], turn: i32) {
@@ -203,7 +220,7 @@ impl Mosaic {
         let passes = [(low + 127) >> 8, (high - 129) >> 8];
         let touches = [first_pixel(low, slack), last_pixel(high, slack)];
         let rows = [first_pixel(p[1].min(q[1]), slack), last_pixel(p[1].max(q[1]), slack)];
-        let top = area.rect[1] + area.band;
+        let top = area.top + area.band;
         let [first_row, last_row] = [(rows[0] - top).max(0), (rows[1] - top).min(area.rows as i32 - 1)];
         let [first, last] = [touches[0].max(area.rect[0]), touches[1].min(area.rect[2])];
         if first > last || (first_row > last_row && rows[0] - top > area.rows as i32) {
@@ -217,9 +234,9 @@ impl Mosaic {
         let least = -((size * i64::from(slack) + 256) >> 8);
         let most = (size * i64::from(128 + slack)) >> 8;
         let stride = area.stride();
-        let column = f64x8::from_slice(simd, &EIGHT);
-        let (bias, round) = (1.0 / f64::from(1 << 30), f64x8::splat(simd, ROUND));
-        let (zero, end) = (f64x8::splat(simd, 0.0), f64x8::splat(simd, area.rows as f64));
+        let column = f64x4::from_slice(simd, &FOUR);
+        let (bias, round) = (1.0 / f64::from(1 << 30), f64x4::splat(simd, ROUND));
+        let (zero, end) = (f64x4::splat(simd, 0.0), f64x4::splat(simd, area.rows as f64));
         let (first_f, last_f) = (f64::from(first_row), f64::from(last_row));
         if dx == 0 {
             // No crossings; a column is touched or not.
@@ -248,23 +265,23 @@ impl Mosaic {
             // First row below the crossing: inside if the edge is entered there, else outside.
             let below = if dx > 0 { (crossing - bias).ceil() } else { (crossing + bias).floor() + 1.0 };
             let (from, to) = ((from - bias).ceil().max(first_f), (to + bias).floor().min(last_f));
-            let below: [u64; 8] = whole(below.max(zero).min(end) + round);
+            let below: [u64; 4] = whole(below.max(zero).min(end) + round);
             let some = from.simd_le(to).to_bitmask();
-            let from: [u64; 8] = whole(from.min(end) + round);
-            let to: [u64; 8] = whole(to.max(zero) + 1.0 + round);
-            for lane in 0..(last - x + 1).min(8) as usize {
+            let from: [u64; 4] = whole(from.min(end) + round);
+            let to: [u64; 4] = whole(to.max(zero) + 1.0 + round);
+            for lane in 0..(last - x + 1).min(4) as usize {
                 let at_x = x + lane as i32;
                 let at = ((at_x - area.left) >> 4) as usize * stride;
                 let column = (at_x & 15) as usize;
                 if at_x >= passes[0] && at_x <= passes[1] {
-                    self.step[at + below[lane] as u32 as usize].0[column] += dx.signum();
+                    self.step[at + below[lane] as u32 as usize].0[column] += dx.signum() as i16;
                 }
                 if some >> lane & 1 == 1 {
                     self.step[at + from[lane] as u32 as usize].0[column] -= 1;
                     self.step[at + to[lane] as u32 as usize].0[column] += 1;
                 }
             }
-            x += 8;
+            x += 4;
         }
     }
 
@@ -320,32 +337,26 @@ impl Mosaic {
         if x0 > x1 || y0 > y1 {
             return;
         }
-        let (stride, nothing) = (area.stride(), i32x16::splat(simd, NO_DEPTH));
+        let nothing = i32x16::splat(simd, NO_DEPTH);
         let small = x1 - x0 < FEW_PX && y1 - y0 < FEW_PX;
         let plane = if small { [0.0; 3] } else { plane_of([a, b, c, d], four, area.slack) };
         let farthest = i32x16::splat(simd, farthest[2]);
         for sixteen in x0 >> 4..=x1 >> 4 {
             let x = sixteen * 16;
-            let columns = (0xFFFFu64 << (x0 - x).max(0)) & (0xFFFF >> (15 - (x1 - x).min(15)));
-            let columns = mask32x16::from_bitmask(simd, columns);
-            let above = ((x - area.left) >> 4) as usize * stride;
-            let row_of = |y: i32| above + (y - area.band - top) as usize;
-            if small {
-                let lower = columns.select(farthest, nothing);
-                for row in &mut self.depth[row_of(y0)..=row_of(y1)] {
-                    i32x16::from_slice(simd, &row.0).min(lower).store_slice(&mut row.0);
-                }
-                continue;
-            }
+            let above = ((x - area.left) >> 4) as usize * area.tiles;
             for tile in y0 >> 4..=y1 >> 4 {
-                let over = tile_plane(plane, x, tile * 16);
-                let (from, to) = (y0.max(tile * 16), y1.min(tile * 16 + 15));
-                for (y, row) in (from..).zip(&mut self.depth[row_of(from)..=row_of(to)]) {
-                    // Depths of 0 and more are ordered as their bits are, and what is below 0 comes before them.
-                    let depth = over.row(simd, y & 15).bitcast::<i32x16<S>>().max(farthest);
-                    let lower = columns.select(depth, nothing);
-                    i32x16::from_slice(simd, &row.0).min(lower).store_slice(&mut row.0);
-                }
+                let y = tile * 16;
+                let within = [(x0 - x).max(0), (y0 - y).max(0), (x1 - x).min(15), (y1 - y).min(15)];
+                let blocks = mask32x16::from_bitmask(simd, u64::from(blocks_in(within.map(|px| px >> 2))));
+                // Depths of 0 and more are ordered as their bits are, and what is below 0 comes before them.
+                let depth = match small {
+                    true => farthest,
+                    false => {
+                        tile_plane(plane, x, y).block_mins(simd, within).bitcast::<i32x16<S>>().max(farthest)
+                    }
+                };
+                let row = &mut self.depth[above + ((y - area.band - area.top) >> 4) as usize].0;
+                i32x16::from_slice(simd, row).min(blocks.select(depth, nothing)).store_slice(row);
             }
         }
     }
@@ -353,50 +364,51 @@ impl Mosaic {
     /// Adds up the counts, raises the pixels of the surface that are covered, and leaves all empty.
     #[inline(always)]
     fn finish<S: Simd>(&mut self, simd: S, surface: &mut Surface, area: &Area, nearest: f32) {
-        let [_, top, right, bottom] = area.rect;
-        let (zero, one) = (i32x16::splat(simd, 0), i32x16::splat(simd, 1));
-        let nothing = i32x16::splat(simd, NO_DEPTH);
+        let (zero, nothing) = (i16x16::splat(simd, 0), i32x16::splat(simd, NO_DEPTH));
         let highest = i32x16::splat(simd, nearest.to_bits().cast_signed());
-        for sixteen in area.left >> 4..=right >> 4 {
-            let first = (sixteen - (area.left >> 4)) as usize * area.stride();
+        for sixteen in area.left >> 4..=area.rect[2] >> 4 {
+            let at = ((sixteen * 16 - area.left) >> 4) as usize;
+            let steps = &mut self.step[at * area.stride()..][..area.stride()];
             let mut count = zero;
-            let mut y = top;
-            while y <= bottom {
-                let tile = surface.tile(sixteen, y >> 4);
-                let next = ((y | 15) + 1).min(bottom + 1);
-                let gains = surface.tile_min(tile) < nearest;
-                let mut wrote = false;
-                for row in y..next {
-                    let at = first + (row - top) as usize;
-                    let step = &mut self.step[at].0;
-                    count += i32x16::from_slice(simd, step);
-                    zero.store_slice(step);
-                    let depth = &mut self.depth[at].0;
-                    let covered = count.simd_ge(one);
-                    if gains && covered.any_true() {
-                        if !wrote {
-                            surface.open(simd, tile);
-                            wrote = true;
-                        }
-                        let depth = i32x16::from_slice(simd, depth).min(highest);
-                        surface.raise(simd, tile, row & 15, depth.bitcast(), covered);
-                    }
-                    nothing.store_slice(depth);
+            for (tile, steps) in steps[..area.rows].chunks_mut(16).enumerate() {
+                let blocks = &mut self.depth[at * area.tiles + tile].0;
+                let tile = surface.tile(sixteen, (area.top >> 4) + tile as i32);
+                let covered = add_up(simd, &mut count, steps);
+                if surface.tile_min(tile) < nearest {
+                    let depth = i32x16::from_slice(simd, blocks).min(highest);
+                    surface.raise_covered(simd, tile, &covered, depth.bitcast(), nearest);
                 }
-                if wrote {
-                    surface.raised(tile, nearest);
-                }
-                y = next;
+                nothing.store_slice(blocks);
             }
-            zero.store_slice(&mut self.step[first + area.rows].0);
+            zero.store_slice(&mut steps[area.rows].0);
         }
     }
 }
 
-const EIGHT: [f64; 8] = [0., 1., 2., 3., 4., 5., 6., 7.];
+/// Adds the steps of up to sixteen rows to the counts, leaves none, and says for each row which counts are 1 or more.
+#[inline(always)]
+fn add_up<S: Simd>(simd: S, count: &mut i16x16<S>, steps: &mut [Steps]) -> [u16; 16] {
+    let zero = i16x16::splat(simd, 0);
+    let (mut any, mut covered) = (zero, [0; 16]);
+    for row in &*steps {
+        any |= i16x16::from_slice(simd, &row.0);
+    }
+    if any.simd_eq(zero).all_true() {
+        covered[..steps.len()].fill(count.simd_gt(zero).to_bitmask() as u16);
+        return covered;
+    }
+    for (row, covered) in steps.iter_mut().zip(&mut covered) {
+        *count += i16x16::from_slice(simd, &row.0);
+        *covered = count.simd_gt(zero).to_bitmask() as u16;
+        zero.store_slice(&mut row.0);
+    }
+    covered
+}
+
+const FOUR: [f64; 4] = [0., 1., 2., 3.];
 
 /// Whole numbers from sums with [`ROUND`]: in the low 32 bits.
 #[inline(always)]
-fn whole<S: Simd>(v: f64x8<S>) -> [u64; 8] {
-    v.bitcast::<u64x8<S>>().into()
+fn whole<S: Simd>(v: f64x4<S>) -> [u64; 4] {
+    v.bitcast::<u64x4<S>>().into()
 }

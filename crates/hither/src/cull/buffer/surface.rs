@@ -1,101 +1,28 @@
 //! What is kept of an image: for each pixel the farthest depth of what covers all of it, in tiles of 16×16.
 //!
-//! A tile is empty, or one plane of depth (a face covers all of it), or 256 depths. Depths only ever rise.
+//! A tile is empty, or one plane of depth (a face covers all of it), or sixteen floors, one for each block of 4×4
+//! pixels, or floors and 256 depths: a pixel then holds the larger of its own and its block's floor. Depths only ever
+//! rise. What covers whole blocks raises floors alone, a cache line for a tile instead of sixteen; depths are spelled
+//! out where part of a block is covered.
+//!
 //! Sixteen tiles make a cell of 64×64 pixels; a tile's minimum is exact whenever no tile is stale, a cell's
-//! minimum is the least of its tiles'. Of a tile of depths the minima of its sixteen blocks of 4×4 are kept too: one
-//! comparison settles all blocks that a rectangle holds whole, and only at its border pixels are looked at. Pixels
-//! beyond the image hold +∞ and never hold a minimum down.
+//! minimum is the least of its tiles'. Floors rise to the minima of what lies on them: one comparison settles all blocks
+//! that a rectangle holds whole, and only at its border pixels are looked at. Pixels beyond the image hold +∞ and never
+//! hold a minimum down.
 
+use super::tile::{
+    BLOCK_COLUMNS, BLOCK_ROWS, COLUMNS, Row, TilePlane, WHOLE, blocks_in, blocks_of, columns_of,
+};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
-
-/// Depth as a function of a tile's columns and rows, 0 to 15.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct TilePlane {
-    pub origin: f32,
-    pub per_column: f32,
-    pub per_row: f32,
-}
-
-impl TilePlane {
-    pub const ZERO: TilePlane = TilePlane { origin: 0.0, per_column: 0.0, per_row: 0.0 };
-
-    #[inline(always)]
-    pub fn at(&self, column: i32, row: i32) -> f32 {
-        (self.origin + row as f32 * self.per_row) + column as f32 * self.per_column
-    }
-
-    #[inline(always)]
-    pub fn row<S: Simd>(&self, simd: S, row: i32) -> f32x16<S> {
-        f32x16::from_slice(simd, &COLUMNS) * self.per_column + (self.origin + row as f32 * self.per_row)
-    }
-
-    /// The same for all rows.
-    #[inline(always)]
-    pub fn rows<S: Simd>(&self, simd: S) -> PlaneRows<S> {
-        let columns = f32x16::from_slice(simd, &COLUMNS);
-        PlaneRows { column: columns * self.per_column, origin: (columns * self.per_row + self.origin).into() }
-    }
-
-    /// Smallest value over a rectangle of columns and rows (inclusive): floating-point sums are monotonic.
-    #[inline(always)]
-    pub fn min(&self, x0: i32, y0: i32, x1: i32, y1: i32) -> f32 {
-        self.at(if self.per_column < 0.0 { x1 } else { x0 }, if self.per_row < 0.0 { y1 } else { y0 })
-    }
-
-    #[inline(always)]
-    pub fn max(&self) -> f32 {
-        self.at(if self.per_column < 0.0 { 0 } else { 15 }, if self.per_row < 0.0 { 0 } else { 15 })
-    }
-
-    /// Whether it is nowhere below `other`, roundings included: the difference of planes is least in a corner.
-    #[inline(always)]
-    fn above(&self, other: &TilePlane) -> bool {
-        let roundings = (self.size() + other.size()) * 1e-6;
-        let beats = |x: i32, y: i32| self.at(x, y) >= other.at(x, y) + roundings;
-        beats(0, 0) && beats(15, 0) && beats(0, 15) && beats(15, 15)
-    }
-
-    /// No term or sum is larger.
-    #[inline(always)]
-    fn size(&self) -> f32 {
-        self.origin.abs() + 15.0 * (self.per_column.abs() + self.per_row.abs())
-    }
-}
-
-/// A plane over a tile, row by row: the bits of [`TilePlane::row`].
-pub(super) struct PlaneRows<S: Simd> {
-    column: f32x16<S>,
-    origin: [f32; 16],
-}
-
-impl<S: Simd> PlaneRows<S> {
-    #[inline(always)]
-    pub fn row(&self, _simd: S, row: usize) -> f32x16<S> {
-        self.column + self.origin[row]
-    }
-}
-
-pub(super) const COLUMNS: [f32; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
-
-/// The bits of a tile's blocks in columns and rows (inclusive) of them, from 0 to 3; none where the last comes before
-/// the first.
-#[inline(always)]
-fn blocks_in([x0, y0, x1, y1]: [i32; 4]) -> u32 {
-    let columns = (15u32 << x0) & (15 >> (3 - x1));
-    let rows = (0xFFFFu32 << (y0 * 4)) & (0xFFFF >> ((3 - y1) * 4));
-    ((columns & 15) * 0x1111) & rows
-}
-
-/// One row of a tile: a cache line.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
-pub(super) struct Row(pub [f32; 16]);
 
 /// How a tile is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Empty,
     Plane,
+    /// Floors alone.
+    Blocks,
+    /// Floors, and depths that may be above them.
     Pixels,
 }
 
@@ -111,7 +38,9 @@ pub(super) struct Surface {
     kind: Vec<Kind>,
     plane: Vec<TilePlane>,
     rows: Vec<Row>,
-    /// Of a tile of depths that is not stale, the smallest of each block of 4×4, row by row.
+    /// Which rows of a tile of depths are written; the others hold 0.
+    written: Vec<u16>,
+    /// The floor of each block of 4×4 of a tile, row by row; of a tile of depths that is not stale, the smallest depth.
     blocks: Vec<Row>,
     /// By cell, sixteen tiles each: smallest depth, and a bound on the largest.
     min: Vec<Row>,
@@ -139,6 +68,7 @@ impl Surface {
             kind: vec![Kind::Empty; tiles],
             plane: vec![TilePlane::ZERO; tiles],
             rows: vec![Row([0.0; 16]); tiles * 16],
+            written: vec![0; tiles],
             blocks: vec![Row([0.0; 16]); tiles],
             min: vec![Row([0.0; 16]); cells_x * cells_y],
             max: vec![0.0; tiles],
@@ -213,7 +143,7 @@ impl Surface {
             Kind::Empty => true,
             Kind::Plane => self.plane[tile].min(rect[0], rect[1], rect[2], rect[3]) < depth,
             Kind::Pixels if self.is_stale[tile] => true,
-            Kind::Pixels => {
+            Kind::Blocks | Kind::Pixels => {
                 let farther = f32x16::from_slice(simd, &self.blocks[tile].0).simd_lt(depth).to_bitmask();
                 farther as u32 & blocks_in([rect[0] >> 2, rect[1] >> 2, rect[2] >> 2, rect[3] >> 2]) != 0
             }
@@ -237,6 +167,10 @@ impl Surface {
             _ if self.max[tile] <= low => true,
             Kind::Plane if plane.above(&self.plane[tile]) => true,
             Kind::Plane if self.plane[tile].above(&plane) => return,
+            Kind::Blocks => {
+                let floors = f32x16::from_slice(simd, &self.blocks[tile].0);
+                plane.block_mins(simd, WHOLE).simd_ge(floors).to_bitmask() == 0xFFFF
+            }
             _ => false,
         };
         if replace {
@@ -249,9 +183,10 @@ impl Surface {
         }
         self.open(simd, tile);
         for row in 0..16 {
-            let at = &mut self.rows[tile * 16 + row].0;
-            f32x16::from_slice(simd, at).max(plane.row(simd, row as i32)).store_slice(at);
+            let depth = self.row(simd, tile, row).max(plane.row(simd, row as i32));
+            depth.store_slice(&mut self.rows[tile * 16 + row].0);
         }
+        self.written[tile] = 0xFFFF;
         self.raised(tile, high);
     }
 
@@ -275,28 +210,44 @@ impl Surface {
 
     #[inline(always)]
     fn spell_out<S: Simd>(&mut self, simd: S, tile: usize) {
-        let plane = if self.kind[tile] == Kind::Plane { self.plane[tile] } else { TilePlane::ZERO };
-        let (x, y) = self.corner(tile);
-        self.kind[tile] = Kind::Pixels;
-        for row in 0..16i32 {
-            let at = &mut self.rows[tile * 16 + row as usize].0;
-            if y + row >= self.height {
-                *at = [f32::INFINITY; 16];
-                continue;
+        let kind = std::mem::replace(&mut self.kind[tile], Kind::Pixels);
+        let plane = if kind == Kind::Plane { self.plane[tile] } else { TilePlane::ZERO };
+        if kind != Kind::Blocks {
+            plane.block_mins(simd, WHOLE).max(0.0).store_slice(&mut self.blocks[tile].0);
+        }
+        let at_border = self.is_at_border(tile);
+        if kind != Kind::Plane && !at_border {
+            self.written[tile] = 0;
+            return;
+        }
+        self.written[tile] = 0xFFFF;
+        for (row, at) in self.rows[tile * 16..][..16].iter_mut().enumerate() {
+            plane.row(simd, row as i32).store_slice(&mut at.0);
+        }
+        if at_border {
+            let (x, y) = self.corner(tile);
+            for (row, at) in (y..).zip(&mut self.rows[tile * 16..][..16]) {
+                let columns = if row < self.height { (self.width - x).clamp(0, 16) as usize } else { 0 };
+                at.0[columns..].fill(f32::INFINITY);
             }
-            plane.row(simd, row).store_slice(at);
-            if x + 16 > self.width {
-                at[(self.width - x).max(0) as usize..].fill(f32::INFINITY);
-            }
+        }
+    }
+
+    /// The depths of a row of an open tile.
+    #[inline(always)]
+    fn row<S: Simd>(&self, simd: S, tile: usize, row: usize) -> f32x16<S> {
+        match self.written[tile] >> row & 1 {
+            0 => f32x16::splat(simd, 0.0),
+            _ => f32x16::from_slice(simd, &self.rows[tile * 16 + row].0),
         }
     }
 
     /// Raises the pixels of `mask` in a row of an open tile.
     #[inline(always)]
     pub fn raise<S: Simd>(&mut self, simd: S, tile: usize, row: i32, depth: f32x16<S>, mask: mask32x16<S>) {
-        let at = &mut self.rows[tile * 16 + row as usize].0;
-        let old = f32x16::from_slice(simd, at);
-        mask.select(old.max(depth), old).store_slice(at);
+        let old = self.row(simd, tile, row as usize);
+        mask.select(old.max(depth), old).store_slice(&mut self.rows[tile * 16 + row as usize].0);
+        self.written[tile] |= 1 << row;
     }
 
     /// Raises the pixels of a tile that lie in spans of its rows: first and last column. `rows` are those whose
@@ -311,37 +262,147 @@ impl Surface {
         depth: impl Fn(usize) -> f32x16<S>,
         highest: f32,
     ) {
-        let fresh = self.kind[tile] == Kind::Empty && !self.is_at_border(tile);
-        if fresh {
-            self.kind[tile] = Kind::Pixels;
-        } else {
-            self.open(simd, tile);
-        }
+        self.open(simd, tile);
         let (from, to): ([f32; 16], [f32; 16]) = (from.into(), to.into());
         let columns = f32x16::from_slice(simd, &COLUMNS);
         let (first, last) =
             (rows.trailing_zeros() as usize & 15, (31 - (rows | 1).leading_zeros() as usize) & 15);
-        let all = &mut self.rows[tile * 16..][..16];
+        let written = u32::from(self.written[tile]);
         let zero = f32x16::splat(simd, 0.0);
         let mut least = [f32x16::splat(simd, f32::INFINITY); 4];
-        for (quarter, four) in all.chunks_exact_mut(4).enumerate() {
+        for (quarter, four) in self.rows[tile * 16..][..16].chunks_exact_mut(4).enumerate() {
             for (at, row) in four.iter_mut().enumerate() {
                 let at = quarter * 4 + at;
-                let old = if fresh { zero } else { f32x16::from_slice(simd, &row.0) };
+                let old = if written >> at & 1 == 1 { f32x16::from_slice(simd, &row.0) } else { zero };
                 let mut new = old;
                 if at >= first && at <= last {
                     let covered = columns.simd_ge(from[at]) & columns.simd_le(to[at]);
                     new = covered.select(old.max(depth(at)), old);
                     new.store_slice(&mut row.0);
-                } else if fresh {
-                    zero.store_slice(&mut row.0);
                 }
                 least[quarter] = least[quarter].min(new);
             }
         }
+        self.written[tile] |= ((0xFFFFu32 << first) & (0xFFFF >> (15 - last))) as u16;
         self.max[tile] = self.max[tile].max(highest);
         self.raised_by[tile] = self.drawing;
-        self.set_blocks(simd, tile, least);
+        self.raise_floors(simd, tile, least);
+    }
+
+    /// Raises what a patch covers of a tile: in each row the columns that `covered` says, to what `depth` says of their
+    /// block. No depth is above `highest`.
+    #[inline(always)]
+    pub fn raise_covered<S: Simd>(
+        &mut self,
+        simd: S,
+        tile: usize,
+        covered: &[u16; 16],
+        depth: f32x16<S>,
+        highest: f32,
+    ) {
+        let mut covered = covered.map(u32::from);
+        if self.is_at_border(tile) {
+            self.with_what_lies_beyond(tile, &mut covered);
+        }
+        let (mut whole, mut some) = (0, 0);
+        for (at, [a, b, c, d]) in covered.as_chunks::<4>().0.iter().enumerate() {
+            whole |= blocks_of(a & b & c & d) << (at * 4);
+            some |= a | b | c | d;
+        }
+        if some == 0 {
+            return;
+        }
+        let gains = self.floors(simd, tile).simd_lt(depth).to_bitmask() as u32;
+        let in_part = gains & !whole;
+        let mut wrote = false;
+        if in_part != 0 {
+            let depths: [f32; 16] = depth.into();
+            for (at, four) in covered.as_chunks::<4>().0.iter().enumerate() {
+                let columns = columns_of(in_part >> (at * 4));
+                if columns & (four[0] | four[1] | four[2] | four[3]) == 0 {
+                    continue;
+                }
+                if !wrote {
+                    self.open(simd, tile);
+                    wrote = true;
+                }
+                let [a, b, c, d] = depths.as_chunks::<4>().0[at];
+                let depth = f32x16::from_slice(simd, &[a, a, a, a, b, b, b, b, c, c, c, c, d, d, d, d]);
+                for (row, covered) in four.iter().enumerate() {
+                    let mask = mask32x16::from_bitmask(simd, u64::from(covered & columns));
+                    self.raise(simd, tile, (at * 4 + row) as i32, depth, mask);
+                }
+            }
+        }
+        if wrote {
+            self.raised(tile, highest);
+        }
+        self.raise_blocks(simd, tile, whole, depth, highest);
+    }
+
+    /// The floors of a tile, whatever it is; anything for what lies beyond the image.
+    #[inline(always)]
+    fn floors<S: Simd>(&self, simd: S, tile: usize) -> f32x16<S> {
+        match self.kind[tile] {
+            Kind::Empty => f32x16::splat(simd, 0.0),
+            Kind::Plane => self.plane[tile].block_mins(simd, WHOLE),
+            Kind::Blocks | Kind::Pixels => f32x16::from_slice(simd, &self.blocks[tile].0),
+        }
+    }
+
+    /// Adds the pixels of a tile that are not in the image to those that are covered.
+    #[inline(never)]
+    fn with_what_lies_beyond(&self, tile: usize, covered: &mut [u32; 16]) {
+        let (x, y) = self.corner(tile);
+        let columns = 0xFFFF & (0xFFFFu32 << (self.width - x).clamp(0, 16));
+        for (row, covered) in (y..).zip(covered) {
+            *covered |= if row < self.height { columns } else { 0xFFFF };
+        }
+    }
+
+    /// Raises the floors of some blocks of a tile. No depth is above `highest`.
+    #[inline(always)]
+    pub fn raise_blocks<S: Simd>(
+        &mut self,
+        simd: S,
+        tile: usize,
+        blocks: u32,
+        depth: f32x16<S>,
+        highest: f32,
+    ) {
+        if blocks & self.floors(simd, tile).simd_lt(depth).to_bitmask() as u32 == 0 {
+            return;
+        }
+        // What covers all of it, and is nearer than all that was there, leaves nothing of that.
+        let alone = blocks == 0xFFFF && self.max[tile] <= depth.reduce_min();
+        let floors = if alone || self.kind[tile] == Kind::Empty {
+            self.kind[tile] = Kind::Blocks;
+            self.no_floors(simd, tile)
+        } else {
+            if self.kind[tile] == Kind::Plane {
+                self.open(simd, tile);
+                self.mark_stale(tile);
+            }
+            f32x16::from_slice(simd, &self.blocks[tile].0)
+        };
+        let raised = mask32x16::from_bitmask(simd, u64::from(blocks)).select(floors.max(depth), floors);
+        raised.store_slice(&mut self.blocks[tile].0);
+        self.max[tile] = self.max[tile].max(highest);
+        self.raised_by[tile] = self.drawing;
+        self.set_min(simd, tile, raised.reduce_min());
+    }
+
+    /// The floors of an empty tile.
+    #[inline(always)]
+    fn no_floors<S: Simd>(&self, simd: S, tile: usize) -> f32x16<S> {
+        if !self.is_at_border(tile) {
+            return f32x16::splat(simd, 0.0);
+        }
+        let (x, y) = self.corner(tile);
+        let (columns, rows) = ((self.width - x) as f32, (self.height - y) as f32);
+        let beyond = f32x16::from_slice(simd, &BLOCK_COLUMNS).simd_ge(f32x16::splat(simd, columns))
+            | f32x16::from_slice(simd, &BLOCK_ROWS).simd_ge(f32x16::splat(simd, rows));
+        beyond.select(f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, 0.0))
     }
 
     /// Which tiles of a cell hold something that is not nearer than `depth`, of those that meet `rect`.
@@ -398,22 +459,26 @@ impl Surface {
         if self.kind[tile] != Kind::Pixels {
             return;
         }
-        let rows = &self.rows[tile * 16..tile * 16 + 16];
-        let mut least = [f32x16::splat(simd, f32::INFINITY); 4];
-        for (least, four) in least.iter_mut().zip(rows.chunks_exact(4)) {
-            for row in four {
-                *least = least.min(f32x16::from_slice(simd, &row.0));
+        let mut least = [f32x16::splat(simd, 0.0); 4];
+        for (at, (least, four)) in
+            least.iter_mut().zip(self.rows[tile * 16..][..16].as_chunks::<4>().0).enumerate()
+        {
+            if self.written[tile] >> (at * 4) & 15 == 15 {
+                let [a, b, c, d] = four;
+                let (a, b) = (f32x16::from_slice(simd, &a.0), f32x16::from_slice(simd, &b.0));
+                let (c, d) = (f32x16::from_slice(simd, &c.0), f32x16::from_slice(simd, &d.0));
+                *least = a.min(b).min(c.min(d));
             }
         }
-        self.set_blocks(simd, tile, least);
+        self.raise_floors(simd, tile, least);
     }
 
-    /// Keeps the minima of a tile of depths, given those of each column of four rows.
+    /// Raises the floors of a tile of depths to the minima on them, given those of each column of four rows.
     #[inline(always)]
-    fn set_blocks<S: Simd>(&mut self, simd: S, tile: usize, [a, b, c, d]: [f32x16<S>; 4]) {
+    fn raise_floors<S: Simd>(&mut self, simd: S, tile: usize, [a, b, c, d]: [f32x16<S>; 4]) {
         let ((a, b), (c, d)) = (simd.deinterleave_f32x16(a, b), simd.deinterleave_f32x16(c, d));
         let (pairs, others) = simd.deinterleave_f32x16(a.min(b), c.min(d));
-        let blocks = pairs.min(others);
+        let blocks = pairs.min(others).max(f32x16::from_slice(simd, &self.blocks[tile].0));
         blocks.store_slice(&mut self.blocks[tile].0);
         self.set_min(simd, tile, blocks.reduce_min());
     }
@@ -525,11 +590,11 @@ impl Surface {
         match self.kind[tile] {
             Kind::Empty => false,
             Kind::Plane => self.plane[tile].min(inner[0], inner[1], inner[2], inner[3]) > depth,
-            Kind::Pixels => self.pixels_are_nearer(simd, tile, inner, depth),
+            Kind::Blocks | Kind::Pixels => self.pixels_are_nearer(simd, tile, inner, depth),
         }
     }
 
-    /// As [`Surface::tile_is_nearer`] for columns and rows (inclusive) of a tile of depths.
+    /// As [`Surface::tile_is_nearer`] for columns and rows (inclusive) of a tile of floors and maybe depths.
     #[inline(always)]
     fn pixels_are_nearer<S: Simd>(&self, simd: S, tile: usize, rect: [i32; 4], depth: f32) -> bool {
         let [x0, y0, x1, y1] = rect;
@@ -540,17 +605,19 @@ impl Surface {
         if open == 0 {
             return true;
         }
-        if open & blocks_in([(x0 + 3) >> 2, (y0 + 3) >> 2, ((x1 + 1) >> 2) - 1, ((y1 + 1) >> 2) - 1]) != 0 {
+        if self.kind[tile] == Kind::Blocks
+            || open & blocks_in([(x0 + 3) >> 2, (y0 + 3) >> 2, ((x1 + 1) >> 2) - 1, ((y1 + 1) >> 2) - 1]) != 0
+        {
             return false;
         }
-        let columns = (0xFFFF << x0) & (0xFFFF >> (15 - x1));
-        let rows = &self.rows[tile * 16..][..16];
+        let columns = (0xFFFFu32 << x0) & (0xFFFF >> (15 - x1));
         for y in y0..=y1 {
-            if open >> (y & 12) & 15 == 0 {
+            let columns = columns & columns_of(open >> (y & 12));
+            if columns == 0 {
                 continue;
             }
-            let row = f32x16::from_slice(simd, &rows[y as usize & 15].0);
-            let nearer = row.simd_gt(threshold).to_bitmask() as i32;
+            let row = self.row(simd, tile, y as usize & 15);
+            let nearer = row.simd_gt(threshold).to_bitmask() as u32;
             if nearer & columns != columns {
                 return false;
             }
@@ -563,10 +630,13 @@ impl Surface {
         assert!((x as i32) < self.width && (y as i32) < self.height, "({x}, {y}) is outside the image");
         let tile = self.tile(x as i32 >> 4, y as i32 >> 4);
         let (column, row) = (x & 15, y & 15);
+        let floor = self.blocks[tile].0[((row & 12) | (column >> 2)) as usize];
         match self.kind[tile] {
             Kind::Empty => 0.0,
             Kind::Plane => self.plane[tile].at(column as i32, row as i32).max(0.0),
-            Kind::Pixels => self.rows[tile * 16 + row as usize].0[column as usize].max(0.0),
+            Kind::Blocks => floor,
+            Kind::Pixels if self.written[tile] >> row & 1 == 0 => floor,
+            Kind::Pixels => self.rows[tile * 16 + row as usize].0[column as usize].max(floor),
         }
     }
 
@@ -577,13 +647,18 @@ impl Surface {
             match other.kind[tile] {
                 Kind::Empty => {}
                 Kind::Plane => self.cover(simd, tile, other.plane[tile]),
-                Kind::Pixels => {
+                Kind::Blocks | Kind::Pixels => {
+                    let floors = f32x16::from_slice(simd, &other.blocks[tile].0);
+                    self.raise_blocks(simd, tile, 0xFFFF, floors, other.max[tile]);
+                    if other.kind[tile] == Kind::Blocks {
+                        continue;
+                    }
                     self.open(simd, tile);
                     for row in 0..16 {
-                        let theirs = f32x16::from_slice(simd, &other.rows[tile * 16 + row].0);
-                        let at = &mut self.rows[tile * 16 + row].0;
-                        f32x16::from_slice(simd, at).max(theirs).store_slice(at);
+                        let depth = self.row(simd, tile, row).max(other.row(simd, tile, row));
+                        depth.store_slice(&mut self.rows[tile * 16 + row].0);
                     }
+                    self.written[tile] = 0xFFFF;
                     self.raised(tile, other.max[tile]);
                 }
             }
@@ -610,8 +685,28 @@ mod tests {
             let mut slope = || random.between(-0.02, 0.02) as f32;
             let (per_column, per_row) = (slope(), slope());
             let plane = TilePlane { origin: random.between(0.31, 0.7) as f32, per_column, per_row };
-            match random.below(3) {
+            match random.below(4) {
                 0 => surface.cover(simd, tile, plane),
+                3 => {
+                    let whole = if random.one_in(2) { 0xFFFF } else { random.below(0x10000) as u16 };
+                    let covered = std::array::from_fn(|row| if row & 4 == 0 { whole } else { 0xFF0 | whole });
+                    let depth = plane.block_mins(simd, WHOLE);
+                    let at = |column: i32, row: i32| ((x * 16 + column) as u32, (y * 16 + row) as u32);
+                    let pixels = (0..16).flat_map(|row| (0..16).map(move |column| (column, row)));
+                    let seen = |&(column, row): &(i32, i32)| {
+                        x * 16 + column < surface.width && y * 16 + row < surface.height
+                    };
+                    let pixels: Vec<_> = pixels.filter(seen).collect();
+                    let holds = |s: &Surface, (c, r): (i32, i32)| s.depth(at(c, r).0, at(c, r).1);
+                    let before: Vec<f32> = pixels.iter().map(|&p| holds(&surface, p)).collect();
+                    surface.raise_covered(simd, tile, &covered, depth, plane.max());
+                    let depths: [f32; 16] = depth.into();
+                    for (&(c, r), before) in pixels.iter().zip(before) {
+                        let new = depths[((r & 12) | (c >> 2)) as usize];
+                        let raised = if covered[r as usize] >> c & 1 == 1 { before.max(new) } else { before };
+                        assert_eq!(holds(&surface, (c, r)), raised, "({c}, {r}) of tile {x}, {y}");
+                    }
+                }
                 1 => {
                     let from = f32x16::splat(simd, random.below(16) as f32);
                     let to = f32x16::splat(simd, random.below(16) as f32);

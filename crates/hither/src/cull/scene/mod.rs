@@ -1,7 +1,7 @@
 //! Culling a scene: which instances may be seen, front to back.
 //!
 //! ```text
-//! draw what hid something last time, what hid most first
+//! draw what hid something last time, in the order of then
 //! walk the index nearest first:
 //!     a box that the buffer hides, or that is outside: drop it, with all that is in it
 //!     boxes of a node that are too small to hold an occluder: put them aside
@@ -58,12 +58,13 @@ pub struct CullOptions {
     /// Connected pieces of an occluder that touch fewer pixels of the view across or down are left out.
     pub least_piece_px: u32,
     /// So are pieces whose bounding boxes cover fewer pixels of the view than this for each of their faces: they cost more
-    /// than they hide. If one is closed, and large enough, a few boxes inside of it are drawn instead.
+    /// than they hide. Of closed convex pieces of few faces a sixteenth is enough. If another is closed, and large enough, a
+    /// few boxes inside of it are drawn instead.
     pub least_px_a_face: u32,
     /// Boxes of a mesh's own tree that are asked about before an instance counts as visible.
     pub boxes_an_instance: u32,
-    /// Start by drawing what hid something in this culler's last frame of the same view number, what hid most
-    /// first; leave out for some frames what was drawn and hid too little.
+    /// Start by drawing what hid something in this culler's last frame of the same view number, in the order of then; leave
+    /// out for some frames what was drawn and hid too little.
     pub coherence: bool,
     /// With coherence, an occluder of which more faces than this were drawn for each box that it hid, and for one
     /// more, is left out for some frames.
@@ -83,7 +84,7 @@ impl Default for CullOptions {
             coarseness: 1,
             least_occluder_px: 400,
             least_piece_px: 6,
-            least_px_a_face: 4,
+            least_px_a_face: 64,
             boxes_an_instance: 256,
             coherence: false,
             faces_a_hidden_box: 64,
@@ -164,7 +165,8 @@ pub struct Culler {
 #[derive(Debug, Default)]
 struct OneView {
     band: Option<Band>,
-    /// Instances drawn as occluders in the last frame, those that hid most first.
+    /// Instances drawn as occluders in the last frame that hid something, in the order of drawing: nearest first, or as
+    /// in the frame before.
     hid: Vec<Hid>,
     /// Instances that hid too little when they were last drawn, and for how many frames they are not tried again.
     idle: HashMap<u32, u32>,
@@ -269,7 +271,6 @@ impl OneView {
         let culling = dispatch!(options.level, simd => {
             walk::cull(simd, index, occluders, frame, options, &mut band, &before, &mut self.hid)
         });
-        self.hid.sort_unstable_by_key(|h| (std::cmp::Reverse(h.boxes), h.instance));
         self.idle.retain(|_, frames| {
             *frames -= 1;
             *frames > 0
@@ -280,7 +281,7 @@ impl OneView {
             if !pays {
                 idle.insert(h.instance, IDLE_FRAMES + h.instance % IDLE_FRAMES);
             }
-            pays
+            pays && h.boxes > 0
         });
         self.band = Some(band);
         culling
