@@ -421,6 +421,7 @@ impl Band {
                 }
             }
         }
+        // If its outline is too long, its large faces have to do.
         self.mosaic.end(simd, &mut self.surface, &area, self.placed.nearest);
     }
 

@@ -11,8 +11,8 @@
 //! patch    of the joint the pixels whose count is at least one get the least depth of all faces that touch their block
 //! ```
 //!
-//! Where all pixels that a face may touch in a tile hold more than the patch's nearest depth already, the face is left
-//! out there: whatever the joint comes to, it raises none of them.
+//! Where all pixels of the blocks that a face may touch in a tile hold more than the patch's nearest depth already, the
+//! face is left out there: whatever the joint comes to, it raises none of them.
 //!
 //! An edge is `E = A·(X − x) + B·(Y − y)`, positive inside, on snapped coordinates; at pixel centres
 //! `e = ⌊(E + bias) / 256⌋ = A·px + B·py + C` is a whole number with whole steps, and `e ≥ 0` is the fill
@@ -88,7 +88,7 @@ const NO_ROOM: u32 = u32::MAX;
 struct JointTile {
     /// Least depth of the faces that touch a block.
     depth: Row,
-    /// How often the faces cover its centre, less what may be lost on the way to its other points.
+    /// How often the faces cover a pixel's centre, less what may be lost on the way to its other points.
     count: [Counts; 16],
 }
 
@@ -295,11 +295,11 @@ impl<'a> Face<'a> {
         Edge { a, b, c: e >> 8, inside, touch, ends: self.outline.ends >> k & 1 == 1 }
     }
 
-    /// Columns and rows of the tile at (x, y) that the face may touch; there are some.
+    /// Columns and rows of the blocks of the tile at (x, y) that the face may touch; there are some.
     #[inline(always)]
     fn within(&self, x: i32, y: i32) -> [i32; 4] {
         let [left, top, right, bottom] = self.around;
-        [(left - x).max(0), (top - y).max(0), (right - x).min(15), (bottom - y).min(15)]
+        [(left - x).max(0) & !3, (top - y).max(0) & !3, (right - x).min(15) | 3, (bottom - y).min(15) | 3]
     }
 
     /// Edge k of a face of at most sixteen pixels each way, and e at a pixel in or beside it: 32 bits hold all.
@@ -441,9 +441,9 @@ pub(super) fn fill<S: Simd>(
             face.set_plane();
         }
         if outline.corners == 3 {
-            fill_small::<S, 3>(simd, surface, joint, &face);
+            fill_small::<S, 3>(simd, surface, joint, &face, goes);
         } else {
-            fill_small::<S, 4>(simd, surface, joint, &face);
+            fill_small::<S, 4>(simd, surface, joint, &face, goes);
         }
     } else {
         face.set_plane();
@@ -467,7 +467,13 @@ fn column_bits(from: i32, to: i32) -> u64 {
 }
 
 #[inline(always)]
-fn fill_small<S: Simd, const N: usize>(simd: S, surface: &Surface, joint: &mut Joint, face: &Face) {
+fn fill_small<S: Simd, const N: usize>(
+    simd: S,
+    surface: &Surface,
+    joint: &mut Joint,
+    face: &Face,
+    goes: Goes,
+) {
     let [left, top, right, bottom] = face.around;
     let (x0, y0) = (left.max(0), top.max(0));
     let (x1, y1) = (right.min(surface.width - 1), bottom.min(surface.height - 1));
@@ -481,7 +487,8 @@ fn fill_small<S: Simd, const N: usize>(simd: S, surface: &Surface, joint: &mut J
         let x = tile_x * 16;
         for tile_y in y0 >> 4..=y1 >> 4 {
             let tile = surface.tile(tile_x, tile_y);
-            if !surface.may_gain(simd, tile, face.within(x, tile_y * 16), face.patch_nearest) {
+            let within = face.within(x, tile_y * 16);
+            if goes != Goes::Jointly && !surface.may_gain(simd, tile, within, face.patch_nearest) {
                 continue;
             }
             let rows = [y0.max(tile_y * 16), y1.min(tile_y * 16 + 15)];

@@ -21,8 +21,8 @@
 //! boundary winds around the point, and that is the sum of the boundary's crossings with a ray. So step 4
 //! yields the N(c) of [`super`] without looking at a face, for any choice in step 1: an outline around what is
 //! taken is all that it needs. What step 1 takes for a front and is none counts with its true sign, and only
-//! lessens the count. A row changes a pixel's count by 2 for an edge at most, and all rows together by 3: sixteen bits
-//! hold it for [`MOST_EDGES`].
+//! lessens the count. An edge changes the count from one row to the next by 2 at most, and adds to it no less than −2 and
+//! no more than 1: sixteen bits hold both for [`MOST_EDGES`].
 //!
 //! *Ties.* Crossings are taken as if every centre were moved by (ε, ε²), which is what the fill rule says:
 //! columns from an edge's smallest x (inclusive) to its largest (exclusive), and a point on an edge inside if the
@@ -117,7 +117,7 @@ impl Area {
     }
 }
 
-/// A patch with more edges in its outline is not drawn: counts might not fit.
+/// A patch with more edges in its outline is not drawn in this way: counts might not fit.
 const MOST_EDGES: usize = 10_000;
 
 /// A face that touches no more pixels each way has its farthest corner for a plane: it is as good a bound.
@@ -133,7 +133,7 @@ fn plane_of<S: Simd>(corners: [i32x4<S>; 4], four: bool, slack: i32) -> [f64; 3]
     plane_below(&corner, four, slack, size)
 }
 
-/// A pixel that no face touches.
+/// A block that no face touches.
 const NO_DEPTH: i32 = i32::MAX;
 
 impl Mosaic {
@@ -285,7 +285,7 @@ impl Mosaic {
         }
     }
 
-    /// Lowers the pixels around each face that is drawn, and notes its edges that belong to the outline. Returns how
+    /// Lowers the blocks around each face that is drawn, and notes its edges that belong to the outline. Returns how
     /// many there are.
     #[inline(always)]
     fn lower_depths<S: Simd>(
@@ -324,7 +324,7 @@ impl Mosaic {
         drawn
     }
 
-    /// Lowers the pixels around a face to its plane, but not below its farthest corner.
+    /// Lowers the blocks around a face to its plane, but not below its farthest corner.
     #[inline(always)]
     fn lower<S: Simd>(&mut self, simd: S, area: &Area, [a, b, c, d]: [i32x4<S>; 4], four: bool) {
         let [left, top, right, bottom] = area.rect;
@@ -332,13 +332,16 @@ impl Mosaic {
         let last = i32x4::from_slice(simd, &[right, bottom + area.band, 0, 0]);
         let (least, most) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
         let farthest: [i32; 4] = least.into();
-        let [x0, y0, ..]: [i32; 4] = ((least - (area.slack + 1)) >> 8).max(first).into();
-        let [x1, y1, ..]: [i32; 4] = ((most + area.slack) >> 8).min(last).into();
+        let (from, to) = ((least - (area.slack + 1)) >> 8, (most + area.slack) >> 8);
+        // Asked of the whole face, so that all bands of an image hold the same.
+        let [width, height, ..]: [i32; 4] = (to - from).into();
+        let small = width < FEW_PX && height < FEW_PX;
+        let [x0, y0, ..]: [i32; 4] = from.max(first).into();
+        let [x1, y1, ..]: [i32; 4] = to.min(last).into();
         if x0 > x1 || y0 > y1 {
             return;
         }
         let nothing = i32x16::splat(simd, NO_DEPTH);
-        let small = x1 - x0 < FEW_PX && y1 - y0 < FEW_PX;
         let plane = if small { [0.0; 3] } else { plane_of([a, b, c, d], four, area.slack) };
         let farthest = i32x16::splat(simd, farthest[2]);
         for sixteen in x0 >> 4..=x1 >> 4 {

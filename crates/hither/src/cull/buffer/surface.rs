@@ -5,7 +5,8 @@
 //! rise. What covers whole blocks raises floors alone, a cache line for a tile instead of sixteen; depths are spelled
 //! out where part of a block is covered.
 //!
-//! Sixteen tiles make a cell of 64×64 pixels; a tile's minimum is exact whenever no tile is stale, a cell's
+//! Sixteen tiles make a cell of 64×64 pixels; a tile's minimum is exact whenever no tile is stale (of a
+//! plane at the image's border, no more than that), a cell's
 //! minimum is the least of its tiles'. Floors rise to the minima of what lies on them: one comparison settles all blocks
 //! that a rectangle holds whole, and only at its border pixels are looked at. Pixels beyond the image hold +∞ and never
 //! hold a minimum down.
@@ -300,17 +301,16 @@ impl Surface {
         depth: f32x16<S>,
         highest: f32,
     ) {
-        let mut covered = covered.map(u32::from);
-        if self.is_at_border(tile) {
-            self.with_what_lies_beyond(tile, &mut covered);
-        }
-        let (mut whole, mut some) = (0, 0);
+        let (covered, mut whole, mut some) = (covered.map(u32::from), 0, 0);
         for (at, [a, b, c, d]) in covered.as_chunks::<4>().0.iter().enumerate() {
             whole |= blocks_of(a & b & c & d) << (at * 4);
             some |= a | b | c | d;
         }
         if some == 0 {
             return;
+        }
+        if self.is_at_border(tile) {
+            whole = self.whole_in_the_image(tile, &covered);
         }
         let gains = self.floors(simd, tile).simd_lt(depth).to_bitmask() as u32;
         let in_part = gains & !whole;
@@ -328,7 +328,8 @@ impl Surface {
                 }
                 let [a, b, c, d] = depths.as_chunks::<4>().0[at];
                 let depth = f32x16::from_slice(simd, &[a, a, a, a, b, b, b, b, c, c, c, c, d, d, d, d]);
-                for (row, covered) in four.iter().enumerate() {
+                for (row, covered) in four.iter().enumerate().filter(|(_, covered)| **covered & columns != 0)
+                {
                     let mask = mask32x16::from_bitmask(simd, u64::from(covered & columns));
                     self.raise(simd, tile, (at * 4 + row) as i32, depth, mask);
                 }
@@ -350,14 +351,19 @@ impl Surface {
         }
     }
 
-    /// Adds the pixels of a tile that are not in the image to those that are covered.
+    /// Blocks of a tile at the border that are covered, as far as they are in the image.
     #[inline(never)]
-    fn with_what_lies_beyond(&self, tile: usize, covered: &mut [u32; 16]) {
+    fn whole_in_the_image(&self, tile: usize, covered: &[u32; 16]) -> u32 {
         let (x, y) = self.corner(tile);
-        let columns = 0xFFFF & (0xFFFFu32 << (self.width - x).clamp(0, 16));
-        for (row, covered) in (y..).zip(covered) {
-            *covered |= if row < self.height { columns } else { 0xFFFF };
+        let right = 0xFFFF & (0xFFFFu32 << (self.width - x).clamp(0, 16));
+        let (mut whole, mut some) = ([0xFFFF; 4], [0; 4]);
+        for (at, (row, columns)) in (y..).zip(covered).enumerate() {
+            let beyond = if row < self.height { right } else { 0xFFFF };
+            whole[at / 4] &= columns | beyond;
+            some[at / 4] |= columns;
         }
+        let none = some.map(|columns: u32| blocks_of(!columns & 0xFFFF));
+        (0..4).fold(0, |blocks, at| blocks | (blocks_of(whole[at]) & !none[at]) << (at * 4))
     }
 
     /// Raises the floors of some blocks of a tile. No depth is above `highest`.
