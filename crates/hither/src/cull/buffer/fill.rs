@@ -744,3 +744,56 @@ fn fill_tile<S: Simd, const N: usize>(
     }
     surface.raise_covered(simd, tile, &covered, place.depth(simd, face, plane), face.nearest);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::levels;
+    use fearless_simd::dispatch;
+
+    /// A face between two columns of pixels, given its depths there.
+    fn upright([left, right]: [i32; 2], [at_left, at_right]: [f32; 2], ends: u32) -> Outline {
+        let corner = |x: i32, y: i32, depth| Corner { x: x * 256, y: y * 256, depth };
+        let (top, bottom) = (2, 14);
+        let corner = [
+            corner(left, top, at_left),
+            corner(right, top, at_right),
+            corner(right, bottom, at_right),
+            corner(left, bottom, at_left),
+        ];
+        Outline { corner, corners: 4, turn: 1, ends }
+    }
+
+    #[inline(always)]
+    fn drawn<S: Simd>(simd: S, plane_first: bool) -> Vec<f32> {
+        let plane = TilePlane { origin: 0.5, per_column: -0.01, per_row: 0.0 };
+        let mut surface = Surface::new(16, 0, 16);
+        let mut joint = Joint::new(&surface);
+        if plane_first {
+            surface.cover(simd, 0, plane);
+        }
+        let (shared_right, shared_left) = (0b1101, 0b0111);
+        let nearest = 0.475;
+        for face in
+            [upright([-4, 2], [0.4, nearest], shared_right), upright([2, 11], [nearest; 2], shared_left)]
+        {
+            fill(simd, &mut surface, &mut joint, &face, 1, nearest, Goes::Apart);
+        }
+        joint.finish(simd, &mut surface, nearest);
+        if !plane_first {
+            surface.cover(simd, 0, plane);
+        }
+        (0..256).map(|at| surface.depth(at & 15, at >> 4)).collect()
+    }
+
+    #[test]
+    fn a_face_behind_a_plane_lowers_its_blocks_all_the_same() {
+        for level in levels() {
+            let [before, after] = [true, false].map(|first| dispatch!(level, simd => drawn(simd, first)));
+            assert_eq!(before, after);
+            // Behind the plane at its left, before it at its right.
+            let row = &before[8 * 16..9 * 16];
+            assert!(row[1] > 0.48 && row[3] < 0.471 && row[8] > 0.47, "{row:?}");
+        }
+    }
+}
