@@ -24,11 +24,10 @@
 
 use super::fill::{first_pixel, last_pixel, plane_below};
 use super::fine::plane_of;
-use super::loose::tile_plane;
 use super::occluder::{ENDS, Face, Vertices};
 use super::place::Placed;
 use super::surface::Surface;
-use super::tile::{COLUMNS, TilePlane};
+use super::tile::{COLUMNS, TilePlane, tile_plane};
 use fearless_simd::{Simd, f32x8, f32x16, i32x16, mask32x16, prelude::*};
 use glam::DVec3;
 

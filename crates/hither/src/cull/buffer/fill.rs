@@ -18,9 +18,8 @@
 //! `e = ⌊(E + bias) / 256⌋ = A·px + B·py + C` is a whole number with whole steps, and `e ≥ 0` is the fill
 //! rule exactly. A pixel's square, widened by the slack, reaches `h = (|A| + |B|)·(128 + slack)` from there.
 
-use super::loose::tile_plane;
 use super::surface::Surface;
-use super::tile::{Row, TilePlane, blocks_in};
+use super::tile::{Row, TilePlane, blocks_in, tile_plane};
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
 /// A corner on the screen: 1/256 pixel, and a depth that is no larger than the true one.

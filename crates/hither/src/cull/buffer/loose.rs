@@ -17,7 +17,7 @@
 use super::occluder::{Face, Patch, Vertices};
 use super::place::{Placing, ROUND, Sizes, dot};
 use super::surface::Surface;
-use super::tile::{COLUMNS, TilePlane};
+use super::tile::{COLUMNS, tile_plane};
 use crate::index::{Child, Slot, WideTree};
 use crate::raster::{GUARD_MAX, GUARD_MIN, ScreenFromObject};
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*};
@@ -476,15 +476,4 @@ fn spans<S: Simd>(simd: S, faces: &Sixteen, lane: usize, y: f32, inside: u32) ->
     let far = f32x16::splat(simd, FAR);
     let inside = mask32x16::from_bitmask(simd, u64::from(inside));
     (inside.select(from.min(far).ceil(), far), to.max(f32x16::splat(simd, -1.0)).floor())
-}
-
-/// The plane over a tile of the image, lowered by more than the roundings of its use.
-#[inline(always)]
-pub(super) fn tile_plane([a, b, c]: [f64; 3], x: i32, y: i32) -> TilePlane {
-    let (x, y) = (f64::from(x), f64::from(y));
-    let origin = c + a * x + b * y;
-    let size = origin.abs() + 16.0 * (a.abs() + b.abs());
-    let size = size + (c.abs() + a.abs() * x.abs() + b.abs() * y.abs()) * 1e-12;
-    let origin = (origin - size * (1.0 / f64::from(1 << 20))) as f32;
-    TilePlane { origin, per_column: a as f32, per_row: b as f32 }
 }

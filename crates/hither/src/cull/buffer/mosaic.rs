@@ -34,10 +34,9 @@
 
 use super::fill::{Corner, first_pixel, last_pixel, plane_below};
 use super::fine::FinePatch;
-use super::loose::tile_plane;
 use super::place::{Placed, ROUND};
 use super::surface::Surface;
-use super::tile::blocks_in;
+use super::tile::{blocks_in, tile_plane};
 use crate::raster::ScreenFromObject;
 use fearless_simd::{Simd, f32x16, f64x4, i16x16, i32x4, i32x16, mask32x16, prelude::*, u64x4};
 

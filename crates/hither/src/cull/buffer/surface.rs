@@ -5,11 +5,10 @@
 //! rise. What covers whole blocks raises floors alone, a cache line for a tile instead of sixteen; depths are spelled
 //! out where part of a block is covered.
 //!
-//! Sixteen tiles make a cell of 64×64 pixels; a tile's minimum is exact whenever no tile is stale (of a
-//! plane at the image's border, no more than that), a cell's
-//! minimum is the least of its tiles'. Floors rise to the minima of what lies on them: one comparison settles all blocks
-//! that a rectangle holds whole, and only at its border pixels are looked at. Pixels beyond the image hold +∞ and never
-//! hold a minimum down.
+//! Sixteen tiles make a cell of 64×64 pixels; a cell's minimum is the least of its tiles'. A tile's is exact whenever no
+//! tile is stale; that of a plane at the image's border may be too far. Floors rise to the minima of what lies on them: one
+//! comparison settles all blocks that a rectangle holds whole, and only at its border pixels are looked at. Else pixels
+//! beyond the image hold +∞ and never hold a minimum down.
 
 use super::tile::{
     BLOCK_COLUMNS, BLOCK_ROWS, COLUMNS, Row, TilePlane, WHOLE, blocks_in, blocks_of, columns_of,
@@ -198,7 +197,7 @@ impl Surface {
         x + 16 > self.width || y + 16 > self.height
     }
 
-    /// Makes a tile 256 depths, if it is not.
+    /// Makes a tile one of depths, if it is not.
     #[inline(always)]
     pub fn open<S: Simd>(&mut self, simd: S, tile: usize) {
         if self.kind[tile] != Kind::Pixels {
@@ -209,6 +208,7 @@ impl Surface {
         }
     }
 
+    /// Of an empty tile and of floors no row is written; of a plane, and at the image's border, all are.
     #[inline(always)]
     fn spell_out<S: Simd>(&mut self, simd: S, tile: usize) {
         let kind = std::mem::replace(&mut self.kind[tile], Kind::Pixels);

@@ -67,6 +67,17 @@ impl TilePlane {
     }
 }
 
+/// The plane over a tile of the image, lowered by more than the roundings of its use.
+#[inline(always)]
+pub(super) fn tile_plane([a, b, c]: [f64; 3], x: i32, y: i32) -> TilePlane {
+    let (x, y) = (f64::from(x), f64::from(y));
+    let origin = c + a * x + b * y;
+    let size = origin.abs() + 16.0 * (a.abs() + b.abs());
+    let size = size + (c.abs() + a.abs() * x.abs() + b.abs() * y.abs()) * 1e-12;
+    let origin = (origin - size * (1.0 / f64::from(1 << 20))) as f32;
+    TilePlane { origin, per_column: a as f32, per_row: b as f32 }
+}
+
 /// A plane over a tile, row by row: the bits of [`TilePlane::row`].
 pub(super) struct PlaneRows<S: Simd> {
     column: f32x16<S>,
