@@ -16,8 +16,9 @@
 //! *Occluders* are chosen by size on the screen: an instance is drawn if its box covers so many pixels, and of
 //! its surface the pieces that are large enough. With coherence each box that is found hidden counts for who was
 //! drawn last in its middle, and an occluder of many faces that little counted for is not tried again for some
-//! frames. Masked and transparent surfaces never hide. Nothing is kept of where an occluder is, so one that moves or
-//! is switched off costs nothing but its place in the index.
+//! frames. A view that jumps begins anew: what hid nothing from there may hide everything from here. Masked and
+//! transparent surfaces never hide. Nothing is kept of where an occluder is, so one that moves or is switched off
+//! costs nothing but its place in the index.
 //!
 //! The verdicts are those of the conservative buffer: an instance that is left out shows at no point of the
 //! continuous image; or, with [`Meaning::Sampled`], at no pixel's centre. As the former holds at every resolution, the
@@ -63,8 +64,9 @@ pub struct CullOptions {
     pub least_px_a_face: u32,
     /// Boxes of a mesh's own tree that are asked about before an instance counts as visible.
     pub boxes_an_instance: u32,
-    /// Start by drawing what hid something in this culler's last frame of the same view number, in the order of then; leave
-    /// out for some frames what was drawn and hid too little.
+    /// Start by drawing what hid something in this culler's last frame of the same view number, in the order of then;
+    /// leave out for some frames what was drawn and hid too little. A frame whose eye goes or turns more than four
+    /// times as far as the last one's did, or turns by half a radian, begins from nothing.
     pub coherence: bool,
     /// With coherence, an occluder of which more faces than this were drawn for each box that it hid, and for one
     /// more, is left out for some frames.
@@ -165,11 +167,42 @@ pub struct Culler {
 #[derive(Debug, Default)]
 struct OneView {
     band: Option<Band>,
+    /// The last frame's view, and how it came from that before.
+    view: Option<View>,
+    motion: Motion,
     /// Instances drawn as occluders in the last frame that hid something, in the order of drawing: nearest first, or as
     /// in the frame before.
     hid: Vec<Hid>,
     /// Instances that hid too little when they were last drawn, and for how many frames they are not tried again.
     idle: HashMap<u32, u32>,
+}
+
+/// Radians between two frames that have little to show in common.
+const MOST_TURNED: f64 = 0.5;
+
+/// How a view came from another.
+#[derive(Clone, Copy, Debug, Default)]
+struct Motion {
+    /// Metres that the eye went.
+    went: f64,
+    /// Radians that it turned, more or less.
+    turned: f64,
+}
+
+impl Motion {
+    /// Nothing if the views differ in more than where they look from.
+    fn between(before: &View, now: &View) -> Option<Motion> {
+        let alike =
+            before.projection == now.projection && (before.width, before.height) == (now.width, now.height);
+        let turn = before.view_from_world.matrix3 - now.view_from_world.matrix3;
+        let turned = turn.x_axis.length().max(turn.y_axis.length()).max(turn.z_axis.length());
+        alike.then(|| Motion { went: before.eye_in_world().distance(now.eye_in_world()), turned })
+    }
+
+    /// Whether it goes on as before, or comes to rest: no jump.
+    fn goes_on(&self, before: &Motion) -> bool {
+        self.went <= before.went * 4.0 + 0.001 && self.turned <= (before.turned * 4.0 + 0.01).min(MOST_TURNED)
+    }
 }
 
 /// An instance drawn as an occluder.
@@ -263,11 +296,14 @@ impl OneView {
             }
             _ => Band::new(width, 0, height),
         };
-        let before = std::mem::take(&mut self.hid);
-        if !options.coherence {
+        let mut before = std::mem::take(&mut self.hid);
+        let motion = self.view.and_then(|view| Motion::between(&view, &frame.view));
+        if !(options.coherence && motion.is_some_and(|m| m.goes_on(&self.motion))) {
+            before.clear();
             self.idle.clear();
         }
-        let before = Before { hid: if options.coherence { &before } else { &[] }, idle: &self.idle };
+        (self.view, self.motion) = (Some(frame.view), motion.unwrap_or_default());
+        let before = Before { hid: &before, idle: &self.idle };
         let culling = dispatch!(options.level, simd => {
             walk::cull(simd, index, occluders, frame, options, &mut band, &before, &mut self.hid)
         });

@@ -152,6 +152,42 @@ fn occluders_that_rest_and_wake_change_nothing_that_shows() {
 }
 
 #[test]
+fn a_view_that_jumps_begins_from_nothing() {
+    let mut rested = 0;
+    for seed in 0..60 {
+        let index = SceneIndex::build(trouble::scene(seed), &IndexOptions::default());
+        let options = CullOptions {
+            coherence: true,
+            faces_a_hidden_box: 0,
+            least_occluder_px: 0,
+            least_piece_px: 0,
+            ..CullOptions::default()
+        };
+        let mut culler = Culler::new();
+        let here = trouble::view(seed);
+        let mut there = here;
+        there.view_from_world.translation += glam::DVec3::new(1.0, 0.5, -2.0);
+        for _ in 0..3 {
+            let again = culler.cull(&index, &here, &options).unwrap();
+            rested += again.counters.occluders_idle;
+        }
+        let found = culler.cull(&index, &there, &options).unwrap();
+        let anew = cull(&index, &there, &options).unwrap();
+        assert_eq!((found.visible, found.counters), (anew.visible, anew.counters), "seed {seed}");
+        // Going on at that pace is no jump, but turning that far is one each time.
+        there.view_from_world.translation.x += 1.0;
+        rested += culler.cull(&index, &there, &options).unwrap().counters.occluders_idle;
+        for _ in 0..2 {
+            there.view_from_world = glam::DAffine3::from_rotation_y(0.6) * there.view_from_world;
+            let turned = culler.cull(&index, &there, &options).unwrap();
+            assert_eq!(turned.visible, cull(&index, &there, &options).unwrap().visible, "seed {seed}");
+            assert_eq!(turned.counters.occluders_idle, 0);
+        }
+    }
+    assert!(rested > 60, "{rested} rested");
+}
+
+#[test]
 fn planes_and_the_buffer_contradict_neither_each_other_nor_the_truth() {
     let (mut both, mut one) = (0, 0);
     for seed in 0..300 {
