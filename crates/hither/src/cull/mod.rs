@@ -14,8 +14,8 @@ pub mod planes;
 mod scene;
 
 pub use buffer::{
-    Ball, Boxes, CannotMerge, Drawn, Occluder, OccluderError, OcclusionBuffer, OcclusionOptions, PlacedMesh,
-    SampledBuffer, ScreenRect, SharedBuffer, Sides,
+    Ball, Boxes, CannotMerge, Drawn, Occludee, Occluder, OccluderError, OcclusionBuffer, OcclusionOptions,
+    PlacedMesh, SampledBuffer, ScreenRect, SharedBuffer, Sides,
 };
 pub use scene::{CullCounters, CullOptions, Culler, Culling, Judged, Reason, cull};
 

@@ -11,7 +11,7 @@ use super::refit::Refit;
 use super::tree::{Box3, Child, Slot, WideTree};
 use super::{bvh, octree};
 use crate::scene::{Content, Group};
-use glam::DAffine3;
+use glam::{DAffine3, DMat3};
 
 /// An instance of a mesh or of another group. Small: a walk that finds one hidden needs not know where it is.
 #[derive(Clone, Copy, Debug)]
@@ -146,6 +146,7 @@ impl GroupIndex {
             let i = i as usize;
             placed_bounds(&content_bounds(self.items[i].content), &self.group_from_content[i])
         };
+        let is_off = |i: u32| is_off(&self.group_from_content[i as usize]);
         let before = motion.movers.len();
         for &i in &moved {
             let place = &mut self.places[i as usize];
@@ -163,7 +164,7 @@ impl GroupIndex {
         if !joined {
             let slots = moved.iter().map(|&i| {
                 let place = self.places[i as usize];
-                (place.node, place.slot, bounds_now(i))
+                (place.node, place.slot, if is_off(i) { Box3::EMPTY } else { bounds_now(i) }, i)
             });
             motion.refit.set(&mut self.moving, slots);
         }
@@ -172,6 +173,12 @@ impl GroupIndex {
             self.moving = tree_of_items(primitives, self.kind);
             record_places(&self.moving, &mut self.places, true);
             motion.refit = Refit::new(&self.moving);
+            // They have slots to come back to.
+            let off = motion.movers.iter().filter(|&&i| is_off(i)).map(|&i| {
+                let place = self.places[i as usize];
+                (place.node, place.slot, Box3::EMPTY, i)
+            });
+            motion.refit.set(&mut self.moving, off);
         }
         moved.len()
     }
@@ -201,12 +208,18 @@ impl GroupIndex {
             }
         }
         for (i, item) in self.items.iter().enumerate() {
-            let seen = usize::from(!content_bounds(item.content).is_empty());
+            let off = self.places[i].moves && is_off(&self.group_from_content[i]);
+            let seen = usize::from(!content_bounds(item.content).is_empty() && !off);
             assert_eq!(slots[i], seen, "item {i} occurs {} times", slots[i]);
             let (found, now) = (self.group_from_content[i], world[item.node as usize]);
             assert!(found == now || now.is_nan(), "item {i} is out of place");
         }
     }
+}
+
+/// Whether what has moved here is switched off: nothing is left of it.
+fn is_off(transform: &DAffine3) -> bool {
+    transform.matrix3 == DMat3::ZERO
 }
 
 /// A content's box seen through its transform, widened by the rounding of that arithmetic.

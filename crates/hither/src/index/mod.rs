@@ -20,8 +20,9 @@ pub(crate) use mesh::{BlockTree, MeshIndex};
 pub(crate) use tree::{Box3, Child, Slot, WideNode, WideTree};
 
 use crate::scene::{Content, Scene, Transform};
-use glam::DAffine3;
+use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How a scene is indexed.
@@ -43,6 +44,9 @@ pub enum TreeKind {
     OctreePushed,
 }
 
+/// Where a node is that is switched off.
+const OFF: Transform = Transform::Affine(DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO });
+
 /// A scene together with its trees. It owns the scene, so that the two cannot disagree.
 #[derive(Debug)]
 pub struct SceneIndex {
@@ -50,6 +54,8 @@ pub struct SceneIndex {
     options: IndexOptions,
     pub(crate) meshes: Vec<MeshIndex>,
     pub(crate) groups: Vec<GroupIndex>,
+    /// Of nodes that are switched off, where they would be.
+    switched_off: HashMap<u32, Transform>,
     /// A number no other index of this process has, so that a renderer knows what it remembers.
     pub(crate) serial: u64,
 }
@@ -70,7 +76,14 @@ impl SceneIndex {
             });
             groups.push(index);
         }
-        let index = SceneIndex { scene, options: *options, meshes, groups, serial: next_serial() };
+        let index = SceneIndex {
+            scene,
+            options: *options,
+            meshes,
+            groups,
+            switched_off: HashMap::new(),
+            serial: next_serial(),
+        };
         if cfg!(debug_assertions) {
             index.validate();
         }
@@ -118,22 +131,45 @@ impl SceneIndex {
         changed.retain(|&n| (n as usize) < self.scene.root_group().nodes.len());
         changed.sort_unstable();
         changed.dedup();
+        let nodes = &mut self.scene.groups[self.scene.root as usize].nodes;
+        for n in &changed {
+            if let Some(stored) = self.switched_off.get_mut(n) {
+                *stored = std::mem::replace(&mut nodes[*n as usize].local, OFF);
+            }
+        }
         self.update(&changed)
+    }
+
+    /// Switches a node of the root group off, with what hangs from it, or on again, wherever it is then. What is off
+    /// shows nothing, hides nothing and is in no answer; its numbers stay. Returns how many nodes with content it
+    /// concerned. Cost: as of [`SceneIndex::pose`].
+    pub fn set_shown(&mut self, node: u32, shown: bool) -> usize {
+        let local = &mut self.scene.groups[self.scene.root as usize].nodes[node as usize].local;
+        match (shown, self.switched_off.remove(&node)) {
+            (true, None) => return 0,
+            (true, Some(stored)) => *local = stored,
+            (false, stored) => {
+                let before = std::mem::replace(local, OFF);
+                self.switched_off.insert(node, stored.unwrap_or(before));
+            }
+        }
+        self.update(&[node])
     }
 
     /// Moves one node of the root group; returns how many nodes with content moved with it. Cost: as of
     /// [`SceneIndex::pose`].
     pub fn set_transform(&mut self, node: u32, local: Transform) -> usize {
-        let root = self.scene.root as usize;
-        self.scene.groups[root].nodes[node as usize].local = local;
-        self.update(&[node])
+        self.set_transforms([(node, local)])
     }
 
     /// Moves several nodes of the root group at once. Cost: as of [`SceneIndex::pose`], once instead of a node.
     pub fn set_transforms(&mut self, moves: impl IntoIterator<Item = (u32, Transform)>) -> usize {
         let nodes = &mut self.scene.groups[self.scene.root as usize].nodes;
         let place = |(node, local): (u32, Transform)| {
-            nodes[node as usize].local = local;
+            match self.switched_off.get_mut(&node) {
+                Some(stored) => *stored = local,
+                None => nodes[node as usize].local = local,
+            }
             node
         };
         let mut changed: Vec<u32> = moves.into_iter().map(place).collect();
@@ -156,7 +192,11 @@ impl SceneIndex {
     }
 
     /// Gives the scene back.
-    pub fn into_scene(self) -> Scene {
+    pub fn into_scene(mut self) -> Scene {
+        let nodes = &mut self.scene.groups[self.scene.root as usize].nodes;
+        for (node, local) in self.switched_off {
+            nodes[node as usize].local = local;
+        }
         self.scene
     }
 

@@ -36,12 +36,14 @@ impl Refit {
         self.area > LOOSE * self.built_area
     }
 
-    /// Gives leaves new boxes: (node, slot, box). Cost: the nodes above them.
-    pub fn set(&mut self, tree: &mut WideTree, leaves: impl IntoIterator<Item = (u32, u32, Box3)>) {
+    /// Gives leaves new boxes: (node, slot, box, leaf). One with an empty box becomes vacant until it gets another.
+    /// Cost: the nodes above them.
+    pub fn set(&mut self, tree: &mut WideTree, leaves: impl IntoIterator<Item = (u32, u32, Box3, u32)>) {
         // Children come after their parents, so that the last node is always ready.
         let mut touched = BinaryHeap::new();
-        for (node, slot, bounds) in leaves {
-            self.set_slot(tree, node, slot, &bounds);
+        for (node, slot, bounds, leaf) in leaves {
+            let child = if bounds.is_empty() { Slot::EMPTY } else { Slot::leaf(leaf as usize) };
+            self.set_slot(tree, (node, slot), &bounds, child);
             touched.push(node);
         }
         while let Some(node) = touched.pop() {
@@ -54,16 +56,17 @@ impl Refit {
             let bounds = tree.nodes[node as usize].bounds();
             let (above, slot) = self.above[node as usize];
             if tree.nodes[above as usize].bounds_of(slot as usize) != bounds {
-                self.set_slot(tree, above, slot, &bounds);
+                let child = tree.nodes[above as usize].child[slot as usize];
+                self.set_slot(tree, (above, slot), &bounds, child);
                 touched.push(above);
             }
         }
     }
 
-    fn set_slot(&mut self, tree: &mut WideTree, node: u32, slot: u32, bounds: &Box3) {
+    fn set_slot(&mut self, tree: &mut WideTree, (node, slot): (u32, u32), bounds: &Box3, child: Slot) {
         let node = &mut tree.nodes[node as usize];
-        let child = node.child[slot as usize];
-        self.area += bounds.half_area() - node.bounds_of(slot as usize).half_area();
+        let area = |b: &Box3| if b.is_empty() { 0.0 } else { b.half_area() };
+        self.area += area(bounds) - area(&node.bounds_of(slot as usize));
         node.set(slot as usize, bounds, child);
     }
 

@@ -4,8 +4,10 @@
 //! `8·2⁻²⁴·(|r₀|·X + |r₁|·Y + |r₂|·Z + |r₃|)`, where X, Y, Z are the box's largest coordinates: four rounded
 //! coefficients, three products and three sums. It is taken for each box by itself. With errors eₓ of a
 //! numerator, e_w of W and a quotient q, a screen coordinate is off by at most
-//! `(eₓ + |q|·e_w) / (W − e_w)` plus four roundings of q. Each comparison of a number that is not one fails
-//! on the side of *visible*.
+//! `(eₓ + |q|·e_w) / (W − e_w)` plus four roundings of q, where W is at least nine times e_w and beyond the near
+//! plane. Of a box that reaches nearer than that, or farther than f32 can tell, the quotients say nothing: it may
+//! touch every pixel, at any depth, unless it lies wholly beyond a plane through the eye and a side of the image.
+//! Each comparison of a number that is not one fails on the side of *visible*.
 
 use crate::raster::{ScreenFromObject, axes, corner_sums, corners, largest, smallest};
 use fearless_simd::{Simd, prelude::*};
@@ -34,7 +36,8 @@ pub(crate) struct BoxView {
 /// Where sixteen boxes lie.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoxesOnScreen {
-    /// First column each may touch, clipped to the image; then first row, last column, last row.
+    /// First column each may touch, clipped to the image; then first row, last column, last row. All of the image
+    /// where `depth` is +∞.
     pub left: [i32; 16],
     pub top: [i32; 16],
     pub right: [i32; 16],
@@ -215,6 +218,10 @@ fn project_some<S: Simd>(
     let mut known = certain & ordered;
     if !view.in_range {
         (ordered_bits, known) = (0, splat(0.0).simd_gt(splat(0.0)));
+    }
+    let whole = [splat(0.0), splat(0.0), splat(view.width - 1.0), splat(view.height - 1.0)];
+    for (side, whole) in rect.iter_mut().zip(whole) {
+        *side = known.select(*side, whole);
     }
     let to = from + S::f32s::LEN;
     rect[0].to_int::<S::i32s>().store_slice(&mut boxes.left[from..to]);

@@ -84,6 +84,7 @@ mod fine;
 mod inner;
 mod loose;
 mod mosaic;
+mod occludee;
 mod occluder;
 mod place;
 mod queries;
@@ -94,8 +95,9 @@ mod tile;
 
 pub(super) use ask::{BoxView, BoxesOnScreen, project_lanes};
 pub(super) use draw::Band;
+pub use occludee::{Occludee, PlacedMesh};
 pub use occluder::{Occluder, OccluderError, Sides};
-pub use queries::{Ball, Boxes, PlacedMesh, ScreenRect};
+pub use queries::{Ball, Boxes, ScreenRect};
 pub use sampled::SampledBuffer;
 pub use shared::SharedBuffer;
 

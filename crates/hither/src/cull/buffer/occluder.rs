@@ -88,7 +88,6 @@ pub(super) struct Patch {
     pub convex: Option<u32>,
     /// The boxes inside of it.
     pub inner: Range<u32>,
-    pub bounds: Box3,
 }
 
 /// A triangle, or two that share the edge from corner 0 to corner 2.
@@ -113,11 +112,7 @@ impl Occluder {
     /// Prepares triangles. Triangles with a corner that is not finite are left out. Cost: n log n.
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]], sides: Sides) -> Result<Occluder, OccluderError> {
         let two_sided = sides == Sides::Both;
-        for (triangle, corners) in triangles.iter().enumerate() {
-            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= positions.len()) {
-                return Err(OccluderError::Index { triangle, vertex, vertices: positions.len() });
-            }
-        }
+        check_indices(positions, triangles)?;
         Ok(prepare(positions, triangles.iter().map(|&t| (t, two_sided))))
     }
 
@@ -176,6 +171,16 @@ impl Occluder {
             + size_of_val(self.convex.as_slice())
             + size_of_val(self.inner.as_slice())
     }
+}
+
+/// Whether all triangles name vertices that are there.
+pub(super) fn check_indices(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), OccluderError> {
+    for (triangle, corners) in triangles.iter().enumerate() {
+        if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= positions.len()) {
+            return Err(OccluderError::Index { triangle, vertex, vertices: positions.len() });
+        }
+    }
+    Ok(())
 }
 
 /// A triangle being prepared, with indices of welded vertices.
@@ -366,7 +371,6 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
             ),
             convex,
             inner: 0..0,
-            bounds,
         });
         boxes.push(bounds);
     }
@@ -401,16 +405,11 @@ fn add_inner_boxes(occluder: &mut Occluder) {
             let first_vertex = occluder.vertices.x.len() as u32;
             corners.into_iter().for_each(|corner| occluder.vertices.push(corner));
             if let Some(body) = ConvexBody::new(&faces, &occluder.vertices, first_vertex) {
-                let bounds = corners
-                    .iter()
-                    .map(|c| Box3 { min: c.to_array(), max: c.to_array() })
-                    .fold(Box3::EMPTY, |all, one| all.union(&one));
                 occluder.convex.push(body);
                 let convex = Some(occluder.convex.len() as u32 - 1);
                 let (first_face, faces, fine) = (0, 0, None);
                 let inner = 0..0;
-                let box_patch =
-                    Patch { first_vertex, vertices: 8, first_face, faces, fine, convex, inner, bounds };
+                let box_patch = Patch { first_vertex, vertices: 8, first_face, faces, fine, convex, inner };
                 occluder.inner.push(box_patch);
             }
         }

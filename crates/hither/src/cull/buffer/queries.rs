@@ -2,7 +2,7 @@
 
 use super::ask::{BoxView, BoxesOnScreen, project};
 use super::draw::Band;
-use super::{Frame, Occluder, OcclusionBuffer, Verdict};
+use super::{Frame, Occludee, OcclusionBuffer, PlacedMesh, Verdict};
 use crate::conventions::Projection;
 use crate::cull::Meaning;
 use crate::geometry::Aabb;
@@ -108,15 +108,6 @@ pub struct Ball {
     pub radius: f64,
 }
 
-/// A mesh in its place to ask about.
-#[derive(Clone, Copy, Debug)]
-pub struct PlacedMesh<'a> {
-    /// Its surface.
-    pub mesh: &'a Occluder,
-    /// Where it is.
-    pub world_from_object: DAffine3,
-}
-
 impl OcclusionBuffer {
     /// Asks about many boxes of world space: one verdict each, in their order, into `verdicts`.
     pub fn ask(&self, boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
@@ -149,9 +140,8 @@ impl OcclusionBuffer {
         self.frame.ask_rects(&[&self.band], rects, verdicts);
     }
 
-    /// Asks about another mesh, at the cost of drawing its boxes: hidden if each of its faces is. Finer than a
-    /// box around it.
-    pub fn ask_mesh(&self, mesh: &Occluder, world_from_object: &DAffine3) -> Verdict {
+    /// Asks about another mesh: hidden if the boxes around its triangles are. Finer than a box around it.
+    pub fn ask_mesh(&self, mesh: &Occludee, world_from_object: &DAffine3) -> Verdict {
         self.frame.ask_mesh(&[&self.band], mesh, world_from_object)
     }
 
@@ -343,46 +333,8 @@ impl Frame {
         if hidden { Verdict::Hidden } else { Verdict::Visible }
     }
 
-    pub(super) fn ask_mesh(&self, bands: &[&Band], mesh: &Occluder, world_from_object: &DAffine3) -> Verdict {
-        let vertices = &mesh.vertices;
-        let corner = |i: usize| DVec3::new(vertices.x[i].into(), vertices.y[i].into(), vertices.z[i].into());
-        let mut verdict = Verdict::Outside;
-        for patch in &mesh.patches {
-            let around = patch.bounds.to_aabb().transformed(world_from_object);
-            match self.ask_box(bands, &around) {
-                Verdict::Outside => continue,
-                Verdict::Hidden => {
-                    verdict = Verdict::Hidden;
-                    continue;
-                }
-                Verdict::Visible => {}
-            }
-            // Face by face; sixteen of their boxes are asked about together.
-            let faces = &mesh.faces[patch.first_face as usize..][..patch.faces as usize];
-            let boxes: Boxes = faces
-                .iter()
-                .map(|face| {
-                    let corners = &face.corner[..usize::from(face.corners)];
-                    let first = patch.first_vertex as usize;
-                    let points = corners
-                        .iter()
-                        .map(|&v| world_from_object.transform_point3(corner(first + v as usize)));
-                    let b = Aabb::around(points);
-                    // The transform's rounding: three products and sums.
-                    let slack = (b.min.abs().max(b.max.abs()) + world_from_object.translation.abs()) * 1e-14;
-                    Aabb { min: b.min - slack, max: b.max + slack }
-                })
-                .collect();
-            let mut verdicts = Vec::new();
-            self.ask(bands, &boxes, &mut verdicts);
-            if verdicts.contains(&Verdict::Visible) {
-                return Verdict::Visible;
-            }
-            if verdicts.contains(&Verdict::Hidden) {
-                verdict = Verdict::Hidden;
-            }
-        }
-        verdict
+    pub(super) fn ask_mesh(&self, bands: &[&Band], mesh: &Occludee, world_from_object: &DAffine3) -> Verdict {
+        mesh.judge(world_from_object, |boxes, verdicts| self.ask(bands, boxes, verdicts))
     }
 }
 

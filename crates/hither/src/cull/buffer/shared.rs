@@ -1,7 +1,9 @@
 //! An occlusion buffer that several threads draw into and ask at once.
 
 use super::draw::Band;
-use super::{Ball, Boxes, Drawn, Frame, Occluder, OcclusionOptions, PlacedMesh, ScreenRect, Verdict};
+use super::{
+    Ball, Boxes, Drawn, Frame, Occludee, Occluder, OcclusionOptions, PlacedMesh, ScreenRect, Verdict,
+};
 use crate::conventions::{View, ViewError};
 use crate::geometry::Aabb;
 use fearless_simd::dispatch;
@@ -76,7 +78,7 @@ impl SharedBuffer {
     }
 
     /// Asks about another mesh.
-    pub fn ask_mesh(&self, mesh: &Occluder, world_from_object: &DAffine3) -> Verdict {
+    pub fn ask_mesh(&self, mesh: &Occludee, world_from_object: &DAffine3) -> Verdict {
         self.asked(|bands| self.frame.ask_mesh(bands, mesh, world_from_object))
     }
 

@@ -9,6 +9,9 @@ use crate::scene::{Content, Material, Mesh, Node, Primitive, Scene, Transform};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+mod asked;
+mod far;
+
 /// A buffer with everything of `scene` drawn into it.
 fn drawn(scene: &Scene, view: &View, options: &OcclusionOptions) -> OcclusionBuffer {
     let occluders: Vec<Occluder> =
@@ -509,44 +512,57 @@ fn points_are_out_of_sight(
             0..8 => f64::from(k >> axis & 1),
             _ => random.unit(),
         }));
-        let p = view.view_from_world.transform_point3(b.min + (b.max - b.min) * pick);
-        let distance = -p.z;
-        let (origin, direction) = match view.projection {
-            Projection::Perspective { .. } => (DVec3::ZERO, p / distance),
-            Projection::Orthographic { .. } => (DVec3::new(p.x, p.y, 0.0), DVec3::NEG_Z),
-        };
-        if distance < view.projection.near() || view.projection.distance(f32::MIN_POSITIVE) < distance {
-            continue;
-        }
-        let scale = view.pixels_per_unit();
-        let (sx, sy) = match view.projection {
-            Projection::Perspective { .. } => (direction.x * scale, -direction.y * scale),
-            Projection::Orthographic { .. } => (p.x * scale, -p.y * scale),
-        };
-        let (hw, hh) = (f64::from(view.width) * 0.5, f64::from(view.height) * 0.5);
-        if sx.abs() > hw - 1e-9 || sy.abs() > hh - 1e-9 {
-            continue;
-        }
-        assert!(verdict == Verdict::Hidden, "seed {seed}: {b:?} is in view at {p}");
-        let nearest = sight.distance((origin, direction));
-        assert!(
-            nearest <= distance * (1.0 + 1e-12),
-            "seed {seed}: {b:?} is seen at {p}; nearest is {nearest}"
-        );
+        let p = b.min + (b.max - b.min) * pick;
+        point_is_out_of_sight(sight, view, p, verdict, &|| format!("seed {seed}: {b:?}"));
     }
+}
+
+/// Asserts that a point of the world, of something with this verdict, is out of view or behind something.
+fn point_is_out_of_sight(
+    sight: &Sight,
+    view: &View,
+    point: DVec3,
+    verdict: Verdict,
+    what: &dyn Fn() -> String,
+) {
+    let p = view.view_from_world.transform_point3(point);
+    let distance = -p.z;
+    let (origin, direction) = match view.projection {
+        Projection::Perspective { .. } => (DVec3::ZERO, p / distance),
+        Projection::Orthographic { .. } => (DVec3::new(p.x, p.y, 0.0), DVec3::NEG_Z),
+    };
+    if distance < view.projection.near() || view.projection.distance(f32::MIN_POSITIVE) < distance {
+        return;
+    }
+    let scale = view.pixels_per_unit();
+    let (sx, sy) = match view.projection {
+        Projection::Perspective { .. } => (direction.x * scale, -direction.y * scale),
+        Projection::Orthographic { .. } => (p.x * scale, -p.y * scale),
+    };
+    let (hw, hh) = (f64::from(view.width) * 0.5, f64::from(view.height) * 0.5);
+    if sx.abs() > hw - 1e-9 || sy.abs() > hh - 1e-9 {
+        return;
+    }
+    assert!(verdict == Verdict::Hidden, "{} is in view at {p}", what());
+    let nearest = sight.distance((origin, direction));
+    assert!(nearest <= distance * (1.0 + 1e-12), "{} is seen at {p}; nearest is {nearest}", what());
 }
 
 /// One box seen from the front: it fills the image's middle.
 fn wall() -> (Occluder, View) {
+    let (positions, triangles) = cube();
+    let lens = Projection::Perspective { fov_y: 1.0, near: 0.1 };
+    let view = View::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, lens, (160, 120));
+    (Occluder::new(&positions, &triangles, Sides::Front).unwrap(), view)
+}
+
+fn cube() -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let corner =
         |k: u32| Vec3::new((k & 1) as f32 - 0.5, (k >> 1 & 1) as f32 - 0.5, (k >> 2 & 1) as f32 - 0.5);
     let quads = [[0u32, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let triangles: Vec<[u32; 3]> =
         quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
-    let positions: Vec<Vec3> = (0..8).map(corner).collect();
-    let lens = Projection::Perspective { fov_y: 1.0, near: 0.1 };
-    let view = View::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, lens, (160, 120));
-    (Occluder::new(&positions, &triangles, Sides::Front).unwrap(), view)
+    ((0..8).map(corner).collect(), triangles)
 }
 
 fn cube_at(center: DVec3, half: f64) -> Aabb {
@@ -595,6 +611,8 @@ fn balls_rectangles_and_meshes_agree_with_boxes() {
     let (wall, view) = wall();
     let mut buffer = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
     buffer.draw(&wall, &DAffine3::from_scale(DVec3::new(2.0, 2.0, 0.1)));
+    let (positions, triangles) = cube();
+    let cube = Occludee::new(&positions, &triangles).unwrap();
     let random = &mut Random::new(9);
     let mut counts = [0; 3];
     for _ in 0..3000 {
@@ -611,21 +629,21 @@ fn balls_rectangles_and_meshes_agree_with_boxes() {
                 glam::DQuat::IDENTITY,
                 center,
             );
-            assert_ne!(buffer.ask_mesh(&wall, &at), Verdict::Visible, "{center} {half}");
+            assert_ne!(buffer.ask_mesh(&cube, &at), Verdict::Visible, "{center} {half}");
         }
         if buffer.ask_sphere(center, half * 1.75) == Verdict::Hidden {
             assert_eq!(around, Verdict::Hidden, "{center} {half}");
         }
     }
     assert!(counts.iter().all(|&c| c > 100), "{counts:?}");
-    many_are_judged_as_each(&buffer, &wall, random);
+    many_are_judged_as_each(&buffer, &cube, random);
     let middle = |depth| ScreenRect { left: 70.0, top: 50.0, right: 90.0, bottom: 70.0, depth };
     assert_eq!(buffer.ask_rect(&middle(0.01)), Verdict::Hidden);
     assert_eq!(buffer.ask_rect(&middle(0.5)), Verdict::Visible);
     assert_eq!(buffer.ask_rect(&ScreenRect { left: 161.0, right: 170.0, ..middle(0.5) }), Verdict::Outside);
 }
 
-fn many_are_judged_as_each(buffer: &OcclusionBuffer, mesh: &Occluder, random: &mut Random) {
+fn many_are_judged_as_each(buffer: &OcclusionBuffer, mesh: &Occludee, random: &mut Random) {
     let balls: Vec<Ball> = (0..300)
         .map(|_| Ball { center: random.point(5.0) - DVec3::Z * 4.0, radius: random.between(0.01, 1.0) })
         .collect();

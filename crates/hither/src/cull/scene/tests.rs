@@ -6,6 +6,8 @@ use crate::cull::planes::{PlaneCuller, PlanesOptions};
 use crate::index::IndexOptions;
 use crate::reference::trouble;
 use crate::reference::zbuffer;
+use crate::scene::{Content, Mesh, Node, Primitive, Scene, Transform};
+use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use std::collections::HashSet;
 
 /// Instances that show at a pixel centre, by the textbook z-buffer at several times the resolution. A masked
@@ -46,6 +48,100 @@ fn what_shows_is_never_left_out() {
         }
     }
     assert!(left_out > 100, "{left_out} of {total} left out");
+}
+
+/// A scene and its view so far from the origin; and long needles, sheets and blocks around the eye.
+fn far_away(seed: u64, away: f64) -> (Scene, View) {
+    let mut random = trouble::Random::new(seed + 31);
+    let (mut scene, mut view) = (trouble::scene(seed), trouble::view(seed));
+    let offset = DAffine3::from_translation(random.point(1.0).normalize_or(DVec3::X) * away);
+    let mut cube = Mesh::default();
+    cube.positions =
+        (0..8u32).map(|k| Vec3::from_array([0, 1, 2].map(|axis| (k >> axis & 1) as f32 - 0.5))).collect();
+    let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    cube.triangles = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
+    cube.primitives.push(Primitive { triangles: 0..12, material: None });
+    scene.meshes.push(cube);
+    let mesh = scene.meshes.len() as u32 - 1;
+    let eye = view.eye_in_world();
+    let root = scene.root as usize;
+    for _ in 0..12 {
+        let mut size = || [1e-4, 0.01, 0.3, 2.0, 30.0, 1e4][random.below(6) as usize];
+        let size = DVec3::new(size(), size(), size());
+        let place = DAffine3::from_scale_rotation_translation(size, DQuat::IDENTITY, eye + random.point(4.0));
+        let node = Node {
+            name: String::new(),
+            parent: None,
+            local: Transform::Affine(place),
+            content: Content::Mesh(mesh),
+        };
+        scene.groups[root].push(node);
+    }
+    let nodes = &mut scene.groups[root].nodes;
+    for node in nodes.iter_mut().filter(|n| n.parent.is_none()) {
+        node.local = Transform::Affine(offset * node.local.matrix());
+    }
+    view.view_from_world = view.view_from_world * offset.inverse();
+    (scene, view)
+}
+
+#[test]
+fn what_shows_far_from_the_origin_and_around_the_eye_is_never_left_out() {
+    let mut culler = Culler::new();
+    let (mut left_out, mut shown_in_all) = (0, 0);
+    for seed in 0..240 {
+        let away = [0.0, 1e3, 1e5, 1e6, 5.5e6, 1e8][seed as usize % 6];
+        let (scene, view) = far_away(seed, away);
+        let index = SceneIndex::build(scene, &IndexOptions::default());
+        let shown = shown(&index, &view);
+        let options = CullOptions { least_occluder_px: 0, least_piece_px: 0, ..CullOptions::default() };
+        let found = culler.cull(&index, &view, &options).unwrap();
+        let visible: HashSet<u32> = found.visible.iter().copied().collect();
+        assert!(
+            shown.is_subset(&visible),
+            "seed {seed}, {away} m away: {shown:?} show, {visible:?} were found"
+        );
+        left_out += index.scene().instance_count() as usize - visible.len();
+        shown_in_all += shown.len();
+    }
+    assert!(left_out > 100 && shown_in_all > 300, "{left_out} left out, {shown_in_all} show");
+}
+
+#[test]
+fn what_is_switched_off_neither_shows_nor_hides_nor_is_found() {
+    let mut culler = Culler::new();
+    let (mut off_in_all, mut came_into_view) = (0, 0);
+    for seed in 0..120 {
+        let random = &mut trouble::Random::new(seed + 3);
+        let view = trouble::view(seed);
+        let scene = trouble::scene(seed);
+        let before = scene.root_group().nodes.clone();
+        let mut index = SceneIndex::build(scene, &IndexOptions::default());
+        let all = shown(&index, &view);
+        let options = CullOptions { least_occluder_px: 0, least_piece_px: 0, ..CullOptions::default() };
+        for _ in 0..4 {
+            for node in 0..before.len() as u32 {
+                index.set_shown(node, random.one_in(2));
+            }
+            let found = culler.cull(&index, &view, &options).unwrap();
+            let visible: HashSet<u32> = found.visible.iter().copied().collect();
+            let now = shown(&index, &view);
+            assert!(now.is_subset(&visible), "seed {seed}: {now:?} show, {visible:?} were found");
+            came_into_view += now.difference(&all).count();
+            let instances = index.scene().instances();
+            let is_off = |i: &u32| instances[*i as usize].world_from_mesh.matrix3 == DMat3::ZERO;
+            assert!(!visible.iter().any(is_off), "seed {seed}: what is off was found");
+            off_in_all += (0..instances.len() as u32).filter(is_off).count();
+        }
+        for node in 0..before.len() as u32 {
+            index.set_shown(node, true);
+        }
+        assert_eq!(shown(&index, &view), all, "seed {seed}");
+        let scene = index.into_scene();
+        let after = &scene.root_group().nodes;
+        assert!(before.iter().map(|n| n.local).eq(after.iter().map(|n| n.local)), "seed {seed}");
+    }
+    assert!(off_in_all > 200 && came_into_view > 20, "{off_in_all} off, {came_into_view} came into view");
 }
 
 #[test]
@@ -166,7 +262,7 @@ fn a_view_that_jumps_begins_from_nothing() {
         let mut culler = Culler::new();
         let here = trouble::view(seed);
         let mut there = here;
-        there.view_from_world.translation += glam::DVec3::new(1.0, 0.5, -2.0);
+        there.view_from_world.translation += DVec3::new(1.0, 0.5, -2.0);
         for _ in 0..3 {
             let again = culler.cull(&index, &here, &options).unwrap();
             rested += again.counters.occluders_idle;
@@ -178,7 +274,7 @@ fn a_view_that_jumps_begins_from_nothing() {
         there.view_from_world.translation.x += 1.0;
         rested += culler.cull(&index, &there, &options).unwrap().counters.occluders_idle;
         for _ in 0..2 {
-            there.view_from_world = glam::DAffine3::from_rotation_y(0.6) * there.view_from_world;
+            there.view_from_world = DAffine3::from_rotation_y(0.6) * there.view_from_world;
             let turned = culler.cull(&index, &there, &options).unwrap();
             assert_eq!(turned.visible, cull(&index, &there, &options).unwrap().visible, "seed {seed}");
             assert_eq!(turned.counters.occluders_idle, 0);
@@ -265,8 +361,7 @@ fn within_the_margin_a_moved_eye_sees_nothing_that_was_left_out() {
         left_out += index.scene().instance_count() as usize - visible.len();
         for _ in 0..6 {
             let mut direction = || random.between(-1.0, 1.0);
-            let step =
-                glam::DVec3::new(direction(), direction(), direction()).normalize_or_zero() * r * 0.999;
+            let step = DVec3::new(direction(), direction(), direction()).normalize_or_zero() * r * 0.999;
             let mut moved = view;
             moved.view_from_world.translation -= step;
             let shown = shown(&index, &moved);

@@ -107,6 +107,30 @@ fn what_rests_is_not_touched() {
 }
 
 #[test]
+fn what_is_switched_off_costs_nothing_but_its_slot() {
+    for tree in KINDS {
+        let mut scene = Scene::new("hall");
+        scene.meshes.push(triangle());
+        for i in 0..500 {
+            scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(50.0)));
+        }
+        let mut index = SceneIndex::build(scene, &IndexOptions { tree });
+        assert_eq!(index.set_shown(7, false), 1);
+        assert_eq!(index.set_shown(7, false), 0);
+        assert_eq!(items_in(&index.groups[0].moving), []);
+        assert_eq!(items_in(&index.groups[0].resting).len(), 499);
+        // It moves all the same, and comes back where it is then.
+        assert_eq!(index.set_transform(7, Transform::from_translation(DVec3::X * 80.0)), 0);
+        let resting = format!("{:?}", index.groups[0].resting);
+        assert_eq!(index.set_shown(7, true), 1);
+        assert_eq!(index.set_shown(7, true), 0);
+        assert_eq!(items_in(&index.groups[0].moving), [7]);
+        assert!(index.groups[0].bounds().max[0] > 80.0);
+        assert_eq!(format!("{:?}", index.groups[0].resting), resting);
+    }
+}
+
+#[test]
 fn a_tree_grown_loose_is_built_anew() {
     let mut scene = Scene::new("swarm");
     scene.meshes.push(triangle());

@@ -1,0 +1,97 @@
+//! The zero far from the origin, around the eye, and with boxes of every shape: what f32 cannot tell is never hidden.
+
+use super::*;
+
+/// Metres from the origin to where the eye is.
+const AWAY: [f64; 9] = [0.0, 1e2, 1e3, 1e4, 1e5, 1e6, 5.5e6, 1e8, 1e12];
+
+fn lens(random: &mut Random) -> Projection {
+    if random.one_in(4) {
+        Projection::Orthographic { half_height: random.between(0.5, 30.0), near: 0.1, far: 1e4 }
+    } else {
+        Projection::Perspective {
+            fov_y: random.between(0.2, 2.5),
+            near: [1e-3, 0.1, 1.0][random.below(3) as usize],
+        }
+    }
+}
+
+fn some_eye(random: &mut Random, away: f64) -> View {
+    let eye = random.point(1.0).normalize_or(DVec3::X) * away + random.point(5.0);
+    View::look_at(eye, eye + random.point(1.0) * (1.0 + away * 1e-3), DVec3::Y, lens(random), (160, 120))
+}
+
+/// A box around a point near the eye: a point, a needle, a sheet, a block, or one that reaches very far.
+fn near_the_eye(random: &mut Random, view: &View) -> Aabb {
+    let center = view.eye_in_world() + random.point(3.0);
+    let half = DVec3::from_array([0; 3].map(|_| {
+        [0.0, 1e-4, 0.03, 0.3, 1.0, 20.0, 2e3, 1e5, 1e7, 1e16, 1e30, 3e38][random.below(12) as usize]
+    }));
+    Aabb { min: center - half, max: center + half }
+}
+
+/// Whether some of a box's points are surely in view.
+fn is_in_view(view: &View, b: &Aabb, random: &mut Random) -> bool {
+    let (w, h) = (f64::from(view.width) * 0.5 - 0.01, f64::from(view.height) * 0.5 - 0.01);
+    (0..40).any(|_| {
+        let pick = DVec3::new(random.unit(), random.unit(), random.unit());
+        // Of a very large box, the part about the eye, too.
+        let p = b.min + (b.max - b.min) * pick;
+        let p =
+            if random.one_in(2) { p } else { (view.eye_in_world() + random.point(8.0)).clamp(b.min, b.max) };
+        let p = view.view_from_world.transform_point3(p);
+        let (distance, scale) = (-p.z, view.pixels_per_unit());
+        match view.projection {
+            Projection::Perspective { near, .. } => {
+                let (x, y) = (p.x / distance * scale, p.y / distance * scale);
+                distance > near * 1.01 && x.abs() < w && y.abs() < h
+            }
+            Projection::Orthographic { near, far, .. } => {
+                distance > near * 1.01
+                    && distance < far * 0.99
+                    && (p.x * scale).abs() < w
+                    && (p.y * scale).abs() < h
+            }
+        }
+    })
+}
+
+#[test]
+fn nothing_drawn_hides_nothing_wherever_the_eye_is() {
+    let random = &mut Random::new(77);
+    let (mut visible, mut outside) = (0, 0);
+    for (away, level) in
+        AWAY.into_iter().flat_map(|away| levels().into_iter().map(move |level| (away, level)))
+    {
+        for _ in 0..60 {
+            let view = some_eye(random, away);
+            let options = OcclusionOptions {
+                level,
+                eye_moves: if random.one_in(4) { 0.1 } else { 0.0 },
+                objects_move: if random.one_in(4) { 0.1 } else { 0.0 },
+            };
+            let buffer = OcclusionBuffer::new(&view, &options).unwrap();
+            let bounds: Vec<Aabb> = (0..160).map(|_| near_the_eye(random, &view)).collect();
+            let mut verdicts = Vec::new();
+            buffer.ask(&bounds.iter().copied().collect(), &mut verdicts);
+            for (b, verdict) in bounds.iter().zip(verdicts) {
+                assert_ne!(
+                    verdict,
+                    Verdict::Hidden,
+                    "{away} m away: {b:?} seen from {:?}",
+                    view.eye_in_world()
+                );
+                if verdict == Verdict::Visible {
+                    visible += 1;
+                    continue;
+                }
+                outside += 1;
+                // Far away, the test's own f64 tells no more than this.
+                if away <= 1e8 {
+                    assert!(!is_in_view(&view, b, random), "{away} m away: {b:?} is in view");
+                }
+            }
+        }
+    }
+    assert!(visible > 10_000 && outside > 1000, "{visible} visible, {outside} outside");
+}
