@@ -1,8 +1,10 @@
 //! What goes to the terminal: results on standard output, everything else on standard error.
 //!
-//! Nothing here panics when the other end of a pipe is gone.
+//! Nothing here panics when the other end of a pipe is gone. A line on standard error stays one line, whatever names
+//! of files or of things in files it holds.
 
 use crate::failure::Failure;
+use hither_io::one_line;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::time::Duration;
@@ -75,7 +77,7 @@ impl Verbosity {
             return ProgressBar::hidden();
         }
         let spinner = ProgressBar::new_spinner();
-        spinner.set_message(what);
+        spinner.set_message(one_line(&what).into_owned());
         spinner.enable_steady_tick(Duration::from_millis(100));
         spinner
     }
@@ -87,5 +89,5 @@ impl Verbosity {
 
 fn say(line: &str) {
     // If standard error is closed there is nobody left to tell.
-    let _ = writeln!(std::io::stderr(), "{line}");
+    let _ = writeln!(std::io::stderr(), "{}", one_line(line));
 }

@@ -6,7 +6,7 @@ use crate::numbers;
 use crate::options::ViewOptions;
 use glam::DVec3;
 use hither::Scene;
-use hither::conventions::{Projection, View};
+use hither::conventions::{Projection, View, ViewError};
 use hither::geometry::Aabb;
 
 /// Field of view where neither the user nor a camera gives one, degrees.
@@ -67,12 +67,26 @@ impl Eye {
             Eye::Fixed(view)
         };
         // A size or a pose that cannot be drawn is refused here, before any work.
-        eye.view(scene, options.size).validate().map_err(|e| Failure::work(e.to_string()))?;
+        eye.view(scene, source, options.size)?;
         Ok(eye)
     }
 
-    /// The view in the scene's present pose.
-    pub fn view(&self, scene: &Scene, size: (u32, u32)) -> View {
+    /// The view in the present pose of the scene called `source`; a camera that cannot be drawn from is named.
+    pub fn view(&self, scene: &Scene, source: &str, size: (u32, u32)) -> Result<View, Failure> {
+        let view = self.unchecked_view(scene, size);
+        let failure = |error| match (error, self.camera_name(scene)) {
+            (ViewError::Camera(what), Some((index, name))) => {
+                let name = if name.is_empty() { String::new() } else { format!(" (\"{name}\")") };
+                let remedy = "choose another with --camera, or use --eye";
+                Failure::work(format!("{source}: camera {index}{name} cannot be used: {what}; {remedy}"))
+            }
+            _ => Failure::work(error.to_string()),
+        };
+        view.validate().map_err(failure)?;
+        Ok(view)
+    }
+
+    fn unchecked_view(&self, scene: &Scene, size: (u32, u32)) -> View {
         match *self {
             Eye::Fixed(view) => view,
             Eye::Camera { index, fov_y } => {

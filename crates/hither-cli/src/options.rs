@@ -1,8 +1,10 @@
 //! The options that commands share, each stated once, and how their values are written.
 
 use crate::console::Verbosity;
+use crate::failure::Failure;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
+use hither::conventions::{Projection, View};
 use hither::index::TreeKind;
 use hither::render::{Algorithm, BoxTest, Coherence, ComplexityPanel, Shading};
 use hither::{IndexOptions, RenderOptions};
@@ -71,6 +73,15 @@ pub struct ViewOptions {
     /// Which animation of the scene, by name or by index from 0 [default: the first]
     #[arg(long, value_name = "NAME|INDEX", help_heading = "Time")]
     pub animation: Option<String>,
+}
+
+impl ViewOptions {
+    /// Refuses a picture that is too small or too large, which no scene can change.
+    pub fn check_size(&self) -> Result<(), Failure> {
+        let projection = Projection::Perspective { fov_y: 1.0, near: 1.0 };
+        let view = View::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, self.size);
+        view.validate().map_err(|e| Failure::work(e.to_string()))
+    }
 }
 
 /// How the work is done. The picture does not depend on it.

@@ -2,6 +2,7 @@
 
 use crate::console::Verbosity;
 use crate::failure::Failure;
+use crate::numbers::count;
 use hither::scene::Scene;
 use std::path::Path;
 
@@ -27,6 +28,18 @@ pub fn open(name: &str, verbosity: Verbosity) -> Result<Scene, Failure> {
         verbosity.warning(&format!("{name}: {diagnostic}"));
     }
     Ok(loaded.scene)
+}
+
+/// As [`open`], for what draws or sorts surfaces alone: lines that the scene has are told of as left out.
+pub fn open_surfaces(name: &str, verbosity: Verbosity) -> Result<Scene, Failure> {
+    let scene = open(name, verbosity)?;
+    let lines: u64 = scene.meshes.iter().map(|mesh| mesh.lines.len() as u64).sum();
+    if lines > 0 {
+        let (lines, verb) = (count(lines, "line"), if lines == 1 { "is" } else { "are" });
+        verbosity
+            .warning(&format!("{name}: {lines} of its meshes {verb} left out; `hither lines` draws them"));
+    }
+    Ok(scene)
 }
 
 /// Generates a world from its spec, with or without the prefix.

@@ -236,6 +236,118 @@ fn what_is_odd_about_a_file_is_a_warning_and_its_picture_is_made() {
     assert!(frame["pixels_covered"].as_u64().unwrap() > 100, "{frame}");
 }
 
+/// A triangle seen by cameras called `names`, the first of which is at a node scaled by 0, with an animation.
+fn gltf(names: &[&str], mode: u32) -> String {
+    let names: Vec<String> = names.iter().map(|name| serde_json::to_string(name).unwrap()).collect();
+    let lens = r#""type":"perspective","perspective":{"yfov":1.0,"znear":0.1}"#;
+    let cameras: Vec<String> = names.iter().map(|name| format!(r#"{{"name":{name},{lens}}}"#)).collect();
+    let nodes: Vec<String> = (0..names.len())
+        .map(|i| {
+            format!(r#"{{"name":{0},"camera":{i},"translation":[0,0,5],"scale":[{i},{i},{i}]}}"#, names[i])
+        })
+        .collect();
+    let shown: Vec<String> = (0..=names.len()).map(|i| i.to_string()).collect();
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[{shown}]}}],
+        "nodes":[{{"name":{name},"mesh":0}},{nodes}],"cameras":[{cameras}],
+        "meshes":[{{"name":{name},"primitives":[{{"attributes":{{"POSITION":0}},"mode":{mode}}},
+            {{"attributes":{{"POSITION":0}}}}]}}],
+        "animations":[{{"name":{name},"samplers":[{{"input":1,"output":0}}],
+            "channels":[{{"sampler":0,"target":{{"node":0,"path":"translation"}}}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}},
+            {{"bufferView":1,"componentType":5126,"count":3,"type":"SCALAR"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":24,"byteLength":12}}],
+        "buffers":[{{"byteLength":36,"uri":"data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAABA"}}]}}"#,
+        shown = shown.join(","),
+        name = names[0],
+        nodes = nodes.join(","),
+        cameras = cameras.join(","),
+    )
+}
+
+#[test]
+fn names_out_of_files_and_of_files_act_on_no_terminal() {
+    const NAME: &str = "a\nb\u{1b}[31m";
+    let folder = Folder::new("names");
+    fs::write(folder.0.join("names.gltf"), gltf(&[NAME, "two"], 4)).unwrap();
+    fs::write(folder.0.join("far.gltf"), gltf(&["one"], 4).replace("data:;base64,", "a%0Ab%1B[31m")).unwrap();
+    fs::write(folder.0.join("wall.obj"), OBJ.replace("nowhere.mtl", "a\u{1b}[31m.mtl")).unwrap();
+    let odd = folder.path(&format!("{NAME}.obj"));
+    fs::write(&odd, OBJ).unwrap();
+    let (names, far, wall) = (folder.path("names.gltf"), folder.path("far.gltf"), folder.path("wall.obj"));
+    let picture = folder.path(&format!("{NAME}.png"));
+    let (eye, missing) = (["--eye", "0,0,5"], folder.path(&format!("{NAME}/x.png")));
+    for (arguments, lines) in [
+        (&["info", &names][..], 2),
+        (&["info", &far], 1),
+        (&["info", &wall], 2),
+        (&["info", &odd], 2),
+        (&["info", &folder.path(&format!("no {NAME}"))], 1),
+        (&["info", &names, "--no-such", NAME], 1),
+        (&["order", &names, eye[0], eye[1]], 2),
+        (&["render", &names, "-o", &picture, "--camera", NAME], 1),
+        (&["render", &names, "-o", &picture, "--camera", "x"], 1),
+        (&["render", &names, "-o", &picture, "--animation", NAME, "--camera", "two"], 1),
+        (&["render", &names, "-o", &picture, "--animation", "x"], 1),
+        (&["render", &names, "-o", &missing], 1),
+        (&["layers", &names, "-o", &folder.path("x.ora"), "--without", NAME, eye[0], eye[1]], 2),
+        (&["lines", &names, "-o", &folder.path(&format!("{NAME}.txt"))], 1),
+    ] {
+        let output = hither(arguments);
+        let acts = |c: char| c.is_control() && c != '\n';
+        let (told, said) = (stderr(&output), stdout(&output));
+        assert!(!told.contains(acts) && !said.contains(acts), "{arguments:?}: {told:?} {said:?}");
+        assert!(told.lines().count() <= lines, "{arguments:?}: {told}");
+        for line in told.lines().chain(said.lines()) {
+            assert!(!line.starts_with('b'), "{arguments:?}: a name went on in a line of its own: {line}");
+        }
+    }
+}
+
+#[test]
+fn a_camera_that_cannot_be_used_is_named() {
+    let folder = Folder::new("camera");
+    fs::write(folder.0.join("flat.gltf"), gltf(&["squashed", "two"], 4)).unwrap();
+    let (scene, picture) = (folder.path("flat.gltf"), folder.path("x.png"));
+    for command in ["render", "layers"] {
+        refused(
+            &[command, &scene, "-o", &picture.replace("png", "exr")],
+            1,
+            &["flat.gltf: camera 0 (\"squashed\") cannot be used", "finite", "--camera"],
+        );
+    }
+    done(&["render", &scene, "-o", &picture, "--size", "8x8", "--camera", "two"]);
+}
+
+#[test]
+fn lines_that_a_picture_leaves_out_are_told_once() {
+    let folder = Folder::new("left-out");
+    fs::write(folder.0.join("wire.gltf"), gltf(&["eye", "two"], 3)).unwrap();
+    let scene = folder.path("wire.gltf");
+    for command in ["render", "cull", "order", "layers"] {
+        let output = done(&[command, &scene, "--size", "8x8", "--json", "-", "--camera", "two"]);
+        let text = stderr(&output);
+        let told: Vec<&str> = text.lines().filter(|l| l.contains("`hither lines`")).collect();
+        assert_eq!(told.len(), 1, "{command}: {text}");
+        assert!(
+            told[0].starts_with("warning: ") && told[0].contains("2 lines of its meshes are left out"),
+            "{text}"
+        );
+    }
+    let output = done(&["lines", &scene, "--json", "-", "--camera", "two"]);
+    assert!(!stderr(&output).contains("left out"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_model_all_of_whose_faces_are_lost_is_code_1() {
+    let folder = Folder::new("lost");
+    fs::write(folder.0.join("lost.obj"), OBJ.replace("f 1 2 3 4", "f 1 2 3 9").replace("f 4 3", "f 9 3"))
+        .unwrap();
+    let (scene, picture) = (folder.path("lost.obj"), folder.path("x.png"));
+    refused(&["render", &scene, "-o", &picture], 1, &["lost.obj", "all of its 2 faces are lost (line 7: "]);
+    assert_eq!(folder.names(), ["lost.obj"]);
+}
+
 #[test]
 fn the_picture_does_not_depend_on_how_the_work_is_done() {
     let folder = Folder::new("same");
@@ -423,6 +535,10 @@ fn cull_refuses_what_it_cannot_do() {
     refused(&["cull", WORLD, "--method", "planes", "--reasons"], 2, &["--reasons", "buffer"]);
     refused(&["cull", "world:office?n=33", "--method", "planes"], 1, &["539,055,000", "--method buffer"]);
     refused(&["cull", WORLD, "--size", "0x10"], 1, &["0x10"]);
+    // The scene does not exist either; that the size is named shows which was looked at first.
+    for command in ["cull", "render", "order", "layers", "lines"] {
+        refused(&[command, "no-such.glb", "--json", "-", "--size", "0x10"], 1, &["0x10"]);
+    }
     refused(&["cull", WORLD, "--size", "16385x10"], 1, &["16385x10"]);
     refused(&["cull", "no-such.glb"], 1, &["no-such.glb"]);
 }

@@ -1,5 +1,6 @@
 //! The other files that a model names: only those in the model's own folder are ever opened.
 
+use crate::text::one_line;
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -81,10 +82,12 @@ impl ModelFolder {
 impl Companions for ModelFolder {
     fn load(&self, name: &str) -> Result<Vec<u8>, String> {
         let path = self.locate(name)?;
-        let failed = |e: std::io::Error| format!("cannot read {}: {e}", path.display());
+        let shown = path.display().to_string();
+        let shown = one_line(&shown);
+        let failed = |e: std::io::Error| format!("cannot read {shown}: {e}");
         let found = fs::metadata(&path).map_err(failed)?;
         if !found.is_file() {
-            return Err(format!("{} is not a regular file", path.display()));
+            return Err(format!("{shown} is not a regular file"));
         }
         if !self.holds(&path).map_err(failed)? {
             return Err("it is a link that leads out of the model's folder; put the file inside".into());
@@ -130,6 +133,8 @@ mod tests {
         assert!(folder.load("far").unwrap_err().contains("link"));
         assert!(folder.load(".").unwrap_err().contains("regular"));
         assert!(folder.load("none").unwrap_err().contains("cannot read"));
+        let told = folder.load("a\nb\u{1b}[31m.bin").unwrap_err();
+        assert!(told.contains("a\\nb\\u{1b}[31m.bin") && !told.contains(char::is_control), "{told:?}");
         fs::remove_dir_all(&top).unwrap();
     }
 }

@@ -1,13 +1,15 @@
 //! What can go wrong with a file, and what can be odd about one that is read all the same.
 
+use crate::text::one_line;
 use hither::scene::Scene;
 use std::path::{Path, PathBuf};
 
-/// Why a file was not read or written. The text is one line for the user: what, where, what to do.
+/// Why a file was not read or written. The text is one line for the user: what, where, what to do; whatever names it
+/// holds, it is one line, and acts on no terminal.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The operating system refused.
-    #[error("{}: {action}: {source}", path.display())]
+    #[error("{}", one_line(&format!("{}: {action}: {source}", path.display())))]
     Io {
         /// The file.
         path: PathBuf,
@@ -17,7 +19,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// The file is not what its format demands.
-    #[error("{}: {message}", path.display())]
+    #[error("{}", one_line(&format!("{}: {message}", path.display())))]
     Malformed {
         /// The file.
         path: PathBuf,
@@ -25,7 +27,7 @@ pub enum Error {
         message: String,
     },
     /// The file is sound but needs something that is not supported.
-    #[error("{}: {message}", path.display())]
+    #[error("{}", one_line(&format!("{}: {message}", path.display())))]
     Unsupported {
         /// The file.
         path: PathBuf,
@@ -45,7 +47,7 @@ pub struct Diagnostic {
 
 impl std::fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.place, self.message)
+        f.write_str(&one_line(&format!("{}: {}", self.place, self.message)))
     }
 }
 
@@ -64,6 +66,27 @@ impl Loaded {
         match scene.validate() {
             Ok(()) => Ok(Loaded { scene, diagnostics }),
             Err(fault) => Err(Error::Malformed { path: path.to_owned(), message: fault.to_string() }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_and_diagnostics_are_one_line_whatever_names_they_hold() {
+        let path = PathBuf::from("a\nb\u{1b}[31m.obj");
+        let message = "texture \"x\r\u{1b}[2J\"".to_owned();
+        let source = std::io::Error::other("because\nof this");
+        let texts = [
+            Error::Io { path: path.clone(), action: "cannot read", source }.to_string(),
+            Error::Malformed { path: path.clone(), message: message.clone() }.to_string(),
+            Error::Unsupported { path, message: message.clone() }.to_string(),
+            Diagnostic { place: "node \"\n\"".into(), message }.to_string(),
+        ];
+        for text in texts {
+            assert!(!text.contains(char::is_control), "{text:?}");
         }
     }
 }

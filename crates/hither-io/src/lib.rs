@@ -35,6 +35,7 @@ pub use gltf::write_glb;
 pub use map::write_map;
 pub use openraster::write_openraster;
 pub use png::write_png;
+pub use text::one_line;
 pub use texture::read_picture;
 
 use format::Format;

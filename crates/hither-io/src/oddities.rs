@@ -87,6 +87,49 @@ impl Oddities {
     }
 }
 
+/// How many of a file's faces were lost, and why the first was. A face that only has no area is not lost.
+#[derive(Debug, Default)]
+pub(crate) struct Losses {
+    count: u64,
+    /// The number of its line or of itself, and why.
+    first: Option<(u64, &'static str)>,
+    any_understood: bool,
+}
+
+impl Losses {
+    /// The face of this number, or in the line of this number, is left out.
+    #[cold]
+    pub(crate) fn lost(&mut self, number: u64, why: &'static str) {
+        self.count += 1;
+        if self.first.is_none_or(|(first, _)| number < first) {
+            self.first = Some((number, why));
+        }
+    }
+
+    /// What was lost in the next piece of the text, which begins after `lines` lines.
+    pub(crate) fn append(&mut self, piece: Losses, lines: u64) {
+        self.count += piece.count;
+        self.first = self.first.or(piece.first.map(|(line, why)| (line + lines, why)));
+        self.any_understood |= piece.any_understood;
+    }
+
+    /// A face means something.
+    pub(crate) fn understood(&mut self) {
+        self.any_understood = true;
+    }
+
+    /// The line that refuses a file whose faces are all lost. `what` the numbers are of: lines or faces.
+    pub(crate) fn refusal(&self, what: &str) -> Option<String> {
+        let (number, why) = self.first.filter(|_| !self.any_understood)?;
+        let why = why.trim_end_matches(" is left out").trim_end_matches(" and").trim_end_matches("; it");
+        let all = match self.count {
+            1 => "its only face is lost".to_owned(),
+            n => format!("all of its {n} faces are lost"),
+        };
+        Some(format!("{all} ({what} {number}: {why}); nothing is left to draw, so export or fetch it again"))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

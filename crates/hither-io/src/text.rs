@@ -1,6 +1,7 @@
 //! Lines, words and numbers of text formats, taken from bytes as they come: no encoding is assumed.
 
 use memchr::{memchr, memchr2, memrchr};
+use std::borrow::Cow;
 
 /// Lines of a text, ended by LF, CR or both; the last needs no end.
 pub(crate) struct Lines<'a> {
@@ -172,6 +173,23 @@ fn plain_number(word: &[u8]) -> Option<f32> {
 const POWERS_OF_TEN: [f64; 19] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18];
 
+/// `text` on one line that does nothing to a terminal but appear there: characters that control it, or the direction
+/// of writing, are escaped. For messages, which may hold names out of files.
+pub fn one_line(text: &str) -> Cow<'_, str> {
+    let acts = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    if !text.contains(acts) {
+        return Cow::Borrowed(text);
+    }
+    let mut line = String::with_capacity(text.len() + 8);
+    for c in text.chars() {
+        if acts(c) { line.extend(c.escape_debug()) } else { line.push(c) }
+    }
+    Cow::Owned(line)
+}
+
 /// `text` in quotes, on one line and not long, whatever it holds.
 pub(crate) fn quoted(text: &[u8]) -> String {
     const LONGEST: usize = 80;
@@ -255,6 +273,12 @@ mod tests {
                 prop_assert_eq!(number(text.as_bytes()).map(f32::to_bits), exact.map(f32::to_bits), "{}", text);
             }
         }
+    }
+
+    #[test]
+    fn a_line_stays_one_line_and_acts_on_no_terminal() {
+        assert_eq!(one_line("a\nb\u{1b}[31m\u{9b}c\r\u{202e}d"), "a\\nb\\u{1b}[31m\\u{9b}c\\r\\u{202e}d");
+        assert!(matches!(one_line("C:\\ünï \"x\""), Cow::Borrowed("C:\\ünï \"x\"")));
     }
 
     #[test]

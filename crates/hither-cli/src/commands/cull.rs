@@ -79,7 +79,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let to = arguments.report.json.as_deref();
     planes::check_map(arguments)?;
     outputs::check_report(to)?;
-    let mut scene = source::open(&arguments.scene, verbosity)?;
+    arguments.view.check_size()?;
+    let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
     if arguments.method == MethodName::Planes {
         planes::check_scene(&scene, &arguments.scene)?;
     }
@@ -95,7 +96,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let bar = verbosity.bar(timeline.frames.len() as u64, "frames");
     for number in timeline.frames.clone() {
         timeline.pose(&mut index, number);
-        let view = eye.view(index.scene(), arguments.view.size);
+        let view = eye.view(index.scene(), &arguments.scene, arguments.view.size)?;
         let found = method.find(&index, &view)?;
         if let Method::Planes(planes) = &method {
             planes.write_map(number, timeline.numbered)?;

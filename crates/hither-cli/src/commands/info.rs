@@ -7,6 +7,7 @@ use crate::options::ReportOptions;
 use crate::{console, outputs, source};
 use glam::{DAffine3, DVec3};
 use hither::scene::{Camera, CameraProjection, Scene};
+use hither_io::one_line;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -31,7 +32,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn as_text(scene: &Scene, source: &str) -> String {
-    let mut text = format!("{source}\n");
+    let mut text = format!("{}\n", one_line(source));
     let mut line = |what: &str, value: String| {
         let _ = writeln!(text, "  {what:<11} {value}");
     };
@@ -179,5 +180,5 @@ fn lens_as_json(camera: &Camera) -> Value {
 }
 
 fn quoted(name: &str) -> String {
-    format!("\"{name}\"")
+    format!("\"{}\"", one_line(name))
 }

@@ -101,12 +101,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
     arguments.layers.check()?;
     check_outputs(arguments)?;
-    let mut scene = source::open(&arguments.scene, verbosity)?;
+    arguments.view.check_size()?;
+    let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
     let prepared = arguments.parts.prepare(&mut scene, &arguments.scene)?;
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     timeline.pose_scene(&mut scene, timeline.frames.start);
     let eye = Eye::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
-    let view = eye.view(&scene, arguments.view.size);
+    let view = eye.view(&scene, &arguments.scene, arguments.view.size)?;
     // Corners are rounded to 1/256 pixel, and depth to single precision.
     let slack = 1.0 / (256.0 * view.pixels_per_unit()) + 1e-6;
     let options = SortOptions { slack, ..SortOptions::default() };
@@ -124,7 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     for number in timeline.frames.clone() {
         timeline.pose_scene(&mut scene, number);
         painter.pose(&scene);
-        let view = eye.view(&scene, arguments.view.size);
+        let view = eye.view(&scene, &arguments.scene, arguments.view.size)?;
         let taken = take_apart(arguments, &scene, &view, &mut sorting, &mut painter, &paint, &replacements)?;
         if let Some(reuse) = &mut reuse {
             reuse.frame(&scene, &sorting, &view, &taken);

@@ -11,6 +11,7 @@ use crate::outputs;
 use crate::source;
 use crate::timeline::Timeline;
 use hither::order::{Counters, Order, SortOptions};
+use hither_io::one_line;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -49,8 +50,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(dot) = &arguments.dot {
         hither_io::check_writable(dot)?;
     }
+    arguments.view.check_size()?;
     let start = Instant::now();
-    let mut scene = source::open(&arguments.scene, verbosity)?;
+    let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
     let prepared = arguments.parts.prepare(&mut scene, &arguments.scene)?;
     let read_time = start.elapsed();
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
@@ -66,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut frames = Vec::new();
     for number in timeline.frames.clone() {
         timeline.pose_scene(&mut scene, number);
-        let view = eye.view(&scene, arguments.view.size);
+        let view = eye.view(&scene, &arguments.scene, arguments.view.size)?;
         let time = sorting.sort(&scene, &view);
         let order = sorting.sort.order().clone();
         let counters = sorting.sort.counters();
@@ -93,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 "counters": counters_json(&counters),
             }));
         } else if !timeline.numbered {
-            console::print(&listing(&order, &|part| sorting.name(part)))?;
+            console::print(&listing(&order, &|part| one_line(&sorting.name(part)).into_owned()))?;
         }
     }
     let mut json = report::opening("order");

@@ -50,8 +50,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let format = arguments.output.as_deref().map(PictureFormat::of).transpose()?;
     outputs::check(arguments.output.as_deref(), arguments.view.frames.as_ref(), to)?;
 
+    arguments.view.check_size()?;
     let start = Instant::now();
-    let mut scene = source::open(&arguments.scene, verbosity)?;
+    let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
     let read_time = start.elapsed();
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     timeline.pose_first(&mut scene);
@@ -101,7 +102,7 @@ impl Job<'_> {
         let bar = verbosity.bar(self.timeline.frames.len() as u64, "pictures");
         for number in self.timeline.frames.clone() {
             self.timeline.pose(index, number);
-            let view = self.eye.view(index.scene(), self.arguments.view.size);
+            let view = self.eye.view(index.scene(), &self.arguments.scene, self.arguments.view.size)?;
             let start = Instant::now();
             let frame = renderer.render(index, &view, &options).map_err(|e| Failure::work(e.to_string()))?;
             let render_time = start.elapsed();

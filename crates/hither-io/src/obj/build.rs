@@ -8,8 +8,13 @@ use glam::{Vec2, Vec3, Vec4};
 use hither::scene::{Content, Material, Mesh, Node, Primitive, Scene};
 use std::ops::Range;
 
-/// Makes a mesh and a node of every part that has triangles or lines.
-pub(super) fn build(statements: Statements, materials: Materials, oddities: &mut Oddities) -> Scene {
+/// Makes a mesh and a node of every part that has triangles or lines. A file that has faces, but none that can be
+/// drawn, is refused with a line that says why.
+pub(super) fn build(
+    statements: Statements,
+    materials: Materials,
+    oddities: &mut Oddities,
+) -> Result<Scene, String> {
     let mut scene = Scene::new("");
     let mut runs_of_part: Vec<Vec<usize>> = vec![Vec::new(); statements.parts.len()];
     for (i, run) in statements.runs.iter().enumerate() {
@@ -36,9 +41,12 @@ pub(super) fn build(statements: Statements, materials: Materials, oddities: &mut
             scene.meshes.push(mesh);
         }
     }
+    if let Some(refusal) = builder.statements.losses.refusal("line") {
+        return Err(refusal);
+    }
     scene.materials = builder.materials.list;
     scene.textures = builder.materials.textures;
-    scene
+    Ok(scene)
 }
 
 /// The lines of each part, without those that have no length.
@@ -55,9 +63,13 @@ fn lines(statements: &Statements, oddities: &mut Oddities) -> Vec<Vec<[Vec3; 2]>
                         lines[polyline.part as usize].push([a, b]);
                     }
                 }
-                [Some(_), Some(_)] => oddities.in_line(
+                [Some(a), Some(b)] if a.is_nan() || b.is_nan() => oddities.in_line(
                     polyline.line.into(),
                     "a line has a coordinate that is no number and is left out",
+                ),
+                [Some(_), Some(_)] => oddities.in_line(
+                    polyline.line.into(),
+                    "a line has a coordinate that is infinite or beyond 32-bit floats and is left out",
                 ),
                 _ => oddities.in_line(
                     polyline.line.into(),
@@ -178,10 +190,15 @@ impl Builder<'_> {
         for &[position, _, _] in corners {
             match positions.get(position as usize) {
                 Some(p) if p.is_finite() => self.outline.push(*p),
-                Some(_) => {
-                    return self.note(face, "a face has a coordinate that is no number and is left out");
+                Some(p) if p.is_nan() => {
+                    return self.lose(face, "a face has a coordinate that is no number and is left out");
                 }
-                None => return self.note(face, "a face names a vertex that does not exist and is left out"),
+                Some(_) => {
+                    let why =
+                        "a face has a coordinate that is infinite or beyond 32-bit floats and is left out";
+                    return self.lose(face, why);
+                }
+                None => return self.lose(face, "a face names a vertex that does not exist and is left out"),
             }
         }
         self.cut.clear();
@@ -189,15 +206,24 @@ impl Builder<'_> {
         for triangle in &self.cut {
             triangles.push(triangle.map(|i| welder.vertex(corners[i as usize])));
         }
+        if fit == Fit::TooIntricate {
+            return self.lose(face, "the outline of a face is too intricate; it is left out");
+        }
+        self.statements.losses.understood();
         let empty = self.cut.is_empty();
         match fit {
             Fit::CrossesItself => {
                 self.note(face, "the outline of a face crosses itself; its triangles are a guess")
             }
-            Fit::TooIntricate => self.note(face, "the outline of a face is too intricate; it is left out"),
             Fit::Exact if empty => self.note(face, "a face without area is left out"),
-            Fit::Exact => {}
+            Fit::Exact | Fit::TooIntricate => {}
         }
+    }
+
+    fn lose(&mut self, face: usize, why: &'static str) {
+        let line = self.statements.faces[face].line;
+        self.statements.losses.lost(line.into(), why);
+        self.note(face, why);
     }
 
     fn note(&mut self, face: usize, kind: &'static str) {

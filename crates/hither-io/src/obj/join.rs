@@ -130,6 +130,7 @@ impl File {
         append(&mut all.corners, piece.corners);
         append(&mut all.line_corners, piece.line_corners);
         all.known_lines += piece.known_lines;
+        all.losses.append(piece.losses, self.lines);
     }
 }
 

@@ -12,7 +12,8 @@
 //!   them. `d` or `Tr` below full opacity blends. Of textures only `map_Kd` is used.
 //! - Lines (`l`) become the mesh's own lines, which drawings show. Points, curves and surfaces are left out with
 //!   a diagnostic. `call` is never followed.
-//! - Faces with an index out of range, or with a coordinate that is no number, are left out likewise.
+//! - Faces with an index out of range, or with a coordinate that is no number, are left out likewise. Where that is
+//!   the lot of all faces, or the file ends within a vertex before any face, it is refused.
 
 mod build;
 mod join;
@@ -24,6 +25,7 @@ mod tests;
 use crate::companions::{Companions, ModelFolder};
 use crate::input;
 use crate::oddities::Oddities;
+use crate::text;
 use crate::{Error, Loaded};
 use std::path::Path;
 
@@ -47,8 +49,22 @@ pub fn from_bytes(path: &Path, bytes: &[u8], companions: &dyn Companions) -> Res
         let message = "none of its lines is OBJ; is it another format, or damaged?".into();
         return Err(Error::Malformed { path: path.to_owned(), message });
     }
+    let has_no_face = statements.faces.is_empty() && statements.polylines.is_empty();
+    if has_no_face && !statements.positions.is_empty() && ends_within_a_vertex(bytes) {
+        let message = "it ends within a vertex and has no face; it is truncated, fetch it again".into();
+        return Err(Error::Malformed { path: path.to_owned(), message });
+    }
     let materials = materials::load(&statements, companions, &mut oddities);
-    let mut scene = build::build(statements, materials, &mut oddities);
+    let scene = build::build(statements, materials, &mut oddities);
+    let mut scene = scene.map_err(|message| Error::Malformed { path: path.to_owned(), message })?;
     scene.name = path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     Loaded::checked(path, scene, oddities.into_diagnostics())
+}
+
+/// Whether the last line has no end and is a vertex or a normal that lacks numbers.
+fn ends_within_a_vertex(bytes: &[u8]) -> bool {
+    let start = memchr::memrchr2(b'\n', b'\r', bytes).map_or(0, |end| end + 1);
+    let mut rest = &bytes[start..];
+    let is_vertex = matches!(text::word(&mut rest), Some(b"v" | b"vn"));
+    is_vertex && std::iter::from_fn(|| text::word(&mut rest)).take(3).count() < 3
 }

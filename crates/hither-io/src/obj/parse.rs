@@ -5,7 +5,7 @@
 //! first on, and [`super::join`] puts the pieces together.
 
 use super::join;
-use crate::oddities::Oddities;
+use crate::oddities::{Losses, Oddities};
 use crate::srgb;
 use crate::text::{self, Lines, is_blank};
 use glam::{DVec3, Vec2, Vec3, Vec4};
@@ -59,6 +59,8 @@ pub(super) struct Statements {
     pub(super) libraries: Vec<Vec<u8>>,
     /// Lines that begin with a word of the format.
     pub(super) known_lines: u64,
+    /// Faces that are not among these, since they cannot be read.
+    pub(super) losses: Losses,
 }
 
 /// A face: its corners end here, and begin where those of the face before end.
@@ -290,6 +292,7 @@ impl Piece {
             let Some(corner) = corner(&mut rest, counts, corners.len(), &mut self.corners_back) else {
                 corners.truncate(first);
                 self.corners_back.truncate(first_back);
+                self.statements.losses.lost(number, "a face cannot be read and is left out");
                 return self.oddities.in_line_with(number, "corner", || {
                     format!("the face {} cannot be read and is left out", text::quoted(line))
                 });
@@ -300,7 +303,9 @@ impl Piece {
         if end < first + 3 {
             corners.truncate(first);
             self.corners_back.truncate(first_back);
-            return self.oddities.in_line(number, "a face has fewer than three corners and is left out");
+            let why = "a face has fewer than three corners and is left out";
+            self.statements.losses.lost(number, why);
+            return self.oddities.in_line(number, why);
         }
         if self.changed {
             self.begin_run();

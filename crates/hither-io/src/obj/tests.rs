@@ -176,7 +176,12 @@ fn what_is_no_number_reaches_no_mesh() {
     let loaded = read(text);
     assert_eq!(loaded.scene.meshes[0].triangles.len(), 2);
     let told = messages(&loaded);
-    assert!(told.iter().any(|m| m.contains("no number and is left out (5 times)")), "{told:#?}");
+    for part in [
+        "line 12: a face has a coordinate that is no number and is left out (3 times)",
+        "line 13: a face has a coordinate that is infinite or beyond 32-bit floats and is left out (2 times)",
+    ] {
+        assert!(told.iter().any(|m| m == part), "{part} in {told:#?}");
+    }
     assert!(
         told.iter().any(|m| m.contains("the face \"1 2 3x\" cannot be read and is left out (2 times)")),
         "{told:#?}"
@@ -260,6 +265,30 @@ fn what_is_not_obj_is_refused_and_what_is_empty_read() {
     for text in ["", "\n \n", "# only a comment", "v 1 2 3", "o x\ng y\n"] {
         let loaded = read(text);
         assert!(loaded.scene.bounds().is_none() && loaded.scene.instance_count() == 0);
+    }
+}
+
+#[test]
+fn a_file_all_of_whose_faces_are_lost_is_refused() {
+    const V: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    for (rest, part) in [
+        ("f 1 2 4", "its only face is lost (line 4: a face names a vertex that does not exist); nothing"),
+        ("f 1 2 4\nl 1 2\nf 1 2 -9", "all of its 2 faces are lost (line 4: a face names"),
+        ("f 1 2 4\n\nf 1", "all of its 2 faces are lost (line 4: a face names"),
+        ("f 1 2", "(line 4: a face has fewer than three corners"),
+        ("f 1 2 3x", "(line 4: a face cannot be read"),
+        ("v 1e300 0 0\nf 1 2 4", "(line 5: a face has a coordinate that is infinite or beyond 32-bit floats"),
+        ("v 1 2", "ends within a vertex and has no face"),
+        ("v", "ends within a vertex and has no face"),
+        ("vn 0", "ends within a vertex and has no face"),
+    ] {
+        let refused = from_bytes(Path::new("m.obj"), format!("{V}{rest}").as_bytes(), &nothing_there);
+        let text = refused.unwrap_err().to_string();
+        assert!(text.starts_with("m.obj: ") && text.contains(part) && !text.contains('\n'), "{text}");
+    }
+    // A face that is left, or that only has no area; and files that never had a face.
+    for rest in ["f 1 2 3\nf 1 2 4", "f 1 2 2\nf 1 2 4", "v 1 2\n", "v 1 2 3", "l 1 2\nv 1", "vt 0", "# v"] {
+        read(&format!("{V}{rest}"));
     }
 }
 

@@ -1,17 +1,18 @@
 //! From a PLY file's rows to a mesh: indices checked, polygons cut, unused vertices left out.
 
 use super::rows::Rows;
-use crate::oddities::Oddities;
+use crate::oddities::{Losses, Oddities};
 use crate::polygon::{Fit, Triangulator, doubled_area};
 use glam::Vec3;
 use hither::scene::{AlphaMode, Content, Material, Mesh, Node, Primitive, Scene};
 
-/// Makes a scene of one mesh, or of none if there is no triangle.
-pub(super) fn build(rows: Rows, oddities: &mut Oddities) -> Scene {
+/// Makes a scene of one mesh, or of none if there is no triangle. Faces of which none can be drawn are refused.
+pub(super) fn build(rows: Rows, oddities: &mut Oddities) -> Result<Scene, String> {
     let mut scene = Scene::new("");
-    let triangles = triangles(&rows, oddities);
+    let mut losses = Losses::default();
+    let triangles = triangles(&rows, &mut losses, oddities);
     if triangles.is_empty() {
-        return scene;
+        return losses.refusal("face").map_or(Ok(scene), Err);
     }
     let mut mesh = Mesh {
         positions: rows.positions,
@@ -30,10 +31,10 @@ pub(super) fn build(rows: Rows, oddities: &mut Oddities) -> Scene {
     scene.materials.push(Material { double_sided: true, alpha, ..Material::default() });
     scene.groups[0].push(Node { content: Content::Mesh(0), ..Node::default() });
     scene.meshes.push(mesh);
-    scene
+    Ok(scene)
 }
 
-fn triangles(rows: &Rows, oddities: &mut Oddities) -> Vec<[u32; 3]> {
+fn triangles(rows: &Rows, losses: &mut Losses, oddities: &mut Oddities) -> Vec<[u32; 3]> {
     let mut triangles = Vec::with_capacity(rows.face_ends.len());
     let mut triangulator = Triangulator::default();
     let (mut outline, mut cut) = (Vec::new(), Vec::new());
@@ -41,29 +42,42 @@ fn triangles(rows: &Rows, oddities: &mut Oddities) -> Vec<[u32; 3]> {
     for (face, &end) in rows.face_ends.iter().enumerate() {
         let corners = &rows.corners[start..end as usize];
         start = end as usize;
-        let mut note =
-            |kind: &'static str| oddities.note(kind, || format!("face {face}"), || kind.to_owned());
+        let place = || format!("face {face}");
+        let mut note = |kind: &'static str| oddities.note(kind, place, || kind.to_owned());
+        let mut lose = |kind: &'static str| {
+            losses.lost(face as u64, kind);
+            note(kind);
+        };
         outline.clear();
         outline.extend(corners.iter().map_while(|&c| rows.positions.get(c as usize).copied()));
         if outline.len() < corners.len() {
-            note("a face names a vertex that does not exist and is left out");
+            lose("a face names a vertex that does not exist and is left out");
             continue;
         }
         if corners.len() < 3 {
-            note("a face has fewer than three corners and is left out");
+            lose("a face has fewer than three corners and is left out");
             continue;
         }
         if !outline.iter().all(|p| p.is_finite()) {
-            note("a face has a coordinate that is no number and is left out");
+            match outline.iter().any(|p| p.is_nan()) {
+                true => lose("a face has a coordinate that is no number and is left out"),
+                false => {
+                    lose("a face has a coordinate that is infinite or beyond 32-bit floats and is left out")
+                }
+            }
             continue;
         }
         cut.clear();
         match triangulator.triangulate(&outline, &mut cut) {
+            Fit::TooIntricate => {
+                lose("the outline of a face is too intricate; it is left out");
+                continue;
+            }
             Fit::Exact if cut.is_empty() => note("a face without area is left out"),
             Fit::Exact => {}
             Fit::CrossesItself => note("the outline of a face crosses itself; its triangles are a guess"),
-            Fit::TooIntricate => note("the outline of a face is too intricate; it is left out"),
         }
+        losses.understood();
         triangles.extend(cut.iter().map(|t| t.map(|i| corners[i as usize])));
     }
     triangles

@@ -7,7 +7,8 @@
 //!   largest, floats to 1; sRGB) and texture coordinates (`u v`, `s t`, `texture_u texture_v`; v up).
 //! - Scans are often not closed: the material is double-sided. If some vertex is translucent, it blends.
 //! - A file that is shorter than its header says, or a list that claims more than is left, is refused. A face
-//!   with an index out of range, or with a coordinate that is no number, is left out with a diagnostic.
+//!   with an index out of range, or with a coordinate that is no number, is left out with a diagnostic; where that is
+//!   the lot of all faces, the file is refused.
 
 mod build;
 mod header;
@@ -40,7 +41,8 @@ pub fn from_bytes(path: &Path, bytes: &[u8]) -> Result<Loaded, Error> {
         Encoding::LittleEndian => rows::read(Binary::<false>(body), &header.elements, &mut oddities),
         Encoding::BigEndian => rows::read(Binary::<true>(body), &header.elements, &mut oddities),
     };
-    let mut scene = build::build(rows.map_err(malformed)?, &mut oddities);
+    let scene = rows.and_then(|rows| build::build(rows, &mut oddities));
+    let mut scene = scene.map_err(malformed)?;
     scene.name = path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     Loaded::checked(path, scene, oddities.into_diagnostics())
 }

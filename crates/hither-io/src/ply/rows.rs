@@ -36,6 +36,7 @@ pub(super) fn read(
     for element in elements {
         let name = quoted(element.name.as_bytes());
         if element.properties.is_empty() {
+            nothing_of(element, oddities)?;
             continue;
         }
         if !numbers.can_hold(element) {
@@ -69,6 +70,24 @@ pub(super) fn read(
         return Err("it has more than 4,294,967,294 vertices or corners; split it".into());
     }
     Ok(rows)
+}
+
+/// Rows of nothing, which any file can hold: vertices cannot be such, and of faces it is told.
+fn nothing_of(element: &Element, oddities: &mut Oddities) -> Result<(), String> {
+    match element.name.as_str() {
+        _ if element.count == 0 => {}
+        "vertex" => return Err(NO_COORDINATES.into()),
+        "face" | "tristrips" => no_list(element, oddities),
+        _ => {}
+    }
+    Ok(())
+}
+
+const NO_COORDINATES: &str = "its vertices have no x, y and z";
+
+fn no_list(element: &Element, oddities: &mut Oddities) {
+    let place = || format!("element {}", quoted(element.name.as_bytes()));
+    oddities.note("no list", place, || "it has no list of vertices and is passed over".into());
 }
 
 /// Where a vertex's number goes: index into the values of a row.
@@ -160,7 +179,7 @@ impl Rows {
             .collect();
         let all = |slots: [Slot; 3]| slots.into_iter().all(|s| has[s as usize]);
         if !all([Slot::X, Slot::Y, Slot::Z]) {
-            return Err("its vertices have no x, y and z".into());
+            return Err(NO_COORDINATES.into());
         }
         let has_normals = all([Slot::NormalX, Slot::NormalY, Slot::NormalZ]);
         let has_uvs = has[Slot::U as usize] && has[Slot::V as usize];
@@ -218,7 +237,7 @@ impl Rows {
         let list = element.properties.iter().position(is_list);
         let place = || format!("element {}", quoted(element.name.as_bytes()));
         if list.is_none() {
-            oddities.note("no list", place, || "it has no list of vertices and is passed over".into());
+            no_list(element, oddities);
         }
         for property in &element.properties {
             match property.name.as_str() {

@@ -131,14 +131,15 @@ fn concave_faces_are_cut_and_odd_ones_left_out() {
     let told = messages(&loaded);
     for part in [
         "face 1: a face names a vertex that does not exist and is left out (2 times)",
-        "face 3: a face has a coordinate that is no number and is left out (2 times)",
+        "face 3: a face has a coordinate that is no number and is left out",
+        "face 4: a face has a coordinate that is infinite or beyond 32-bit floats and is left out",
         "face 5: a face has fewer than three corners and is left out (2 times)",
         "face 7: a face without area is left out",
         "face 8: the outline of a face crosses itself",
     ] {
         assert!(told.iter().any(|m| m.starts_with(part)), "{part} in {told:#?}");
     }
-    assert_eq!(told.len(), 5);
+    assert_eq!(told.len(), 6);
 }
 
 #[test]
@@ -195,6 +196,35 @@ fn what_lies_or_is_cut_short_is_refused() {
     assert!(refusal(&text_file(flat, "1 2")).contains("no x, y and z"));
     assert!(refusal(&text_file(&format!("element face 1\n{FACES}"), "0")).contains("no element \"vertex\""));
     assert!(refusal(b"ply").contains("does not begin"));
+}
+
+#[test]
+fn a_file_all_of_whose_faces_are_lost_is_refused() {
+    let with = |n: u32, faces: &str| {
+        let elements = format!("element vertex 3\n{XYZ}element face {n}\n{FACES}");
+        text_file(&elements, &format!("0 0 0\n1 0 0\n0 1 0\n{faces}"))
+    };
+    let told = refusal(&with(1, "3 0 1 -7"));
+    assert!(told.contains("its only face is lost (face 0: a face names a vertex that does not"), "{told}");
+    let told = refusal(&with(3, "2 0 1 3 0 1 3 3 0 1 9"));
+    assert!(told.contains("all of its 3 faces are lost (face 0: a face has fewer than three"), "{told}");
+    // One without area is no loss.
+    assert!(read(&with(2, "3 0 1 1 3 0 1 9")).unwrap().scene.bounds().is_none());
+}
+
+#[test]
+fn rows_of_nothing_are_no_vertices_and_faces_of_nothing_are_told() {
+    for format in ["ascii", "binary_little_endian"] {
+        let of = |elements: &str| format!("ply\nformat {format} 1.0\n{elements}end_header\n").into_bytes();
+        for count in ["1", "18446744073709551615"] {
+            assert!(refusal(&of(&format!("element vertex {count}\n"))).contains("no x, y and z"));
+            let faces = format!("element vertex 0\n{XYZ}element face {count}\n");
+            assert!(
+                messages(&read(&of(&faces)).unwrap())[0].contains("\"face\": it has no list of vertices")
+            );
+        }
+        assert!(read(&of("element vertex 0\nelement face 0\n")).unwrap().diagnostics.is_empty());
+    }
 }
 
 proptest! {

@@ -112,8 +112,13 @@ impl Solid {
     fn triangle(&mut self, corners: [Vec3; 3], place: impl FnOnce() -> String, oddities: &mut Oddities) {
         let [a, b, c] = corners;
         if !corners.iter().all(|p| p.is_finite()) {
-            let message = || "a triangle has a coordinate that is no number and is left out".to_owned();
-            oddities.note("not finite", place, message);
+            let what = match corners.iter().any(|p| p.is_nan()) {
+                true => "a triangle has a coordinate that is no number and is left out",
+                false => {
+                    "a triangle has a coordinate that is infinite or beyond 32-bit floats and is left out"
+                }
+            };
+            oddities.note(what, place, || what.to_owned());
         } else if doubled_area(a, b, c) == glam::DVec3::ZERO {
             oddities.note("no area", place, || "a triangle without area is left out".into());
         } else {
@@ -240,9 +245,10 @@ mod tests {
         let loaded = read(&bytes).unwrap();
         assert_eq!(loaded.scene.meshes[0].triangles.len(), 1);
         let told = messages(&loaded);
-        assert_eq!(told.len(), 2);
+        assert_eq!(told.len(), 3);
         assert!(told[0].contains("triangle 1") && told[0].contains("without area is left out (2 times)"));
-        assert!(told[1].contains("triangle 2") && told[1].contains("no number and is left out (2 times)"));
+        assert_eq!(told[1], "triangle 2: a triangle has a coordinate that is no number and is left out");
+        assert!(told[2].contains("triangle 3") && told[2].contains("infinite or beyond 32-bit floats"));
     }
 
     #[test]

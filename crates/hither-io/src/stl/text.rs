@@ -85,7 +85,11 @@ impl Reader {
     /// The format knows triangles alone, but some software writes more corners.
     fn polygon(&mut self, number: u64, oddities: &mut Oddities) {
         if !self.outline.iter().all(|p| p.is_finite()) {
-            oddities.in_line(number, "a loop has a coordinate that is no number and is left out");
+            let what = match self.outline.iter().any(|p| p.is_nan()) {
+                true => "a loop has a coordinate that is no number and is left out",
+                false => "a loop has a coordinate that is infinite or beyond 32-bit floats and is left out",
+            };
+            oddities.in_line(number, what);
             return;
         }
         self.cut.clear();

@@ -25,6 +25,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
     let report = arguments.report.json.as_deref();
     outputs::check(arguments.output.as_deref(), arguments.view.frames.as_ref(), report)?;
+    if arguments.views.is_none() && !arguments.parallel {
+        arguments.view.check_size()?;
+    }
     // All that follows is done in this pool. Nothing before needs one, so that this cannot come too late.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.into()).build_global();
 
@@ -50,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         if number != timeline.frames.start {
             timeline.pose_scene(&mut scene, number);
             preparation.pose(&scene);
-            paper.follow(&scene);
+            paper.follow(&scene, &arguments.scene)?;
         }
         let job = Job { arguments, format, scene: &scene, preparation: &preparation, options: &options };
         let file = arguments.output.as_deref().map(|output| match timeline.numbered {

@@ -65,18 +65,19 @@ impl Paper {
                 size: DVec2::new(f64::from(size.0), f64::from(size.1)),
                 unit: Unit::Pixel,
             };
-            paper.follow(scene);
+            paper.follow(scene, &arguments.scene)?;
             return Ok(paper);
         }
         sheet(scene, arguments, &parallel)
     }
 
-    /// Takes the view of a camera that moved.
-    pub fn follow(&mut self, scene: &Scene) {
+    /// Takes the view of a camera that moved in the scene called `source`.
+    pub fn follow(&mut self, scene: &Scene, source: &str) -> Result<(), Failure> {
         if let Some((eye, size)) = &self.eye {
-            let view = eye.view(scene, *size);
+            let view = eye.view(scene, source, *size)?;
             self.views = vec![Placed { name: String::new(), view, origin: DVec2::ZERO, scale: 1.0 }];
         }
+        Ok(())
     }
 
     /// The views, in the order in which they are drawn.
