@@ -243,16 +243,13 @@ impl<'a> Caster<'a> {
         let depths = polygon.iter().map(|p| lens.depth(-p.z));
         let (lowest, highest) = depths.fold((f64::INFINITY, 0.0f64), |(l, h), d| (l.min(d), h.max(d)));
         let depth = crossing.as_ref().map_or(highest, |x| lens.depth(x.distance).clamp(lowest, highest));
-        // On a plane that is seen nearly edge-on, any depth between its corners' may be found.
-        let slope = lens.depth_slope(corners) * EDGE_PX;
-        let slope = if slope.is_finite() { slope.min(highest - lowest) } else { highest - lowest };
         Some(Meeting {
             id: SurfaceId { instance: placed.number, triangle },
             blended: surface.alpha_mode() == AlphaMode::Blend,
             covers: inside && drawn && !hole,
             certain: !near_edge && hole_is_certain,
             depth,
-            depth_slack: Meeting::slack(depth, slope / EDGE_PX),
+            depth_slack: Meeting::slack(depth, lens.depth_slope(corners), highest - lowest),
             distance: match lens.projection {
                 Projection::Perspective { near, .. } => near / depth,
                 Projection::Orthographic { near, far, .. } => far - depth * (far - near),

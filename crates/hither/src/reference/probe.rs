@@ -1,17 +1,24 @@
 //! What a ray meets, and whether another algorithm's answer for the same pixel can be true.
 //!
-//! An answer is held against the ray with the freedom that the conventions leave and no more: a vertex is
-//! snapped to 1/256 pixel, so a surface may be there or not at a pixel whose centre is that close to one of
-//! its edges, and its depth may be that of a point so far away; depth is an `f32`.
+//! An answer is held against the ray with the freedom that the conventions leave and no more. Vertices are
+//! snapped to whole multiples of 1/256 pixel, so a surface may be there or not at a pixel whose centre is as
+//! close to one of its edges as snapping moves them ([`EDGE_PX`]). Depth is that of the surface's own plane, which
+//! is not snapped, at the pixel's centre; but it is an `f32`, so of two surfaces nearer to each other than its
+//! rounding ([`Meeting::depth_slack`]) either may be called the nearer. [`Probe::judge`] says what follows.
 
 use crate::conventions::{SUBPIXEL, SurfaceId};
 use glam::DVec3;
 
-/// How far an edge may be displaced on screen by snapping, pixels.
-pub const EDGE_PX: f64 = 1.0 / SUBPIXEL as f64;
+/// How far an edge may be displaced on screen by snapping, pixels: both its ends by half a step along each axis at
+/// most. The millionth is for `f64`, where a vertex a thousand kilometres away ends a triangle at the eye.
+pub const EDGE_PX: f64 = std::f64::consts::FRAC_1_SQRT_2 / SUBPIXEL as f64 + 1e-6;
 
-/// Relative error allowed to a depth that is stored and interpolated as `f32`.
-const DEPTH_RELATIVE: f64 = 1e-6;
+/// Relative error allowed to a depth, which is rounded to `f32` twice: two roundings, and two to spare.
+const DEPTH_RELATIVE: f64 = 1.0 / (1 << 22) as f64;
+
+/// Error allowed to the place at which a depth is taken, pixels: slopes and the steps from one pixel to the next may
+/// be `f32`, no more than four roundings over the four pixels of a block; the rest is to spare.
+const DEPTH_PX: f64 = 1.0 / (1 << 18) as f64;
 
 /// A surface at, or within [`EDGE_PX`] of, a pixel's centre.
 #[derive(Clone, Debug)]
@@ -27,7 +34,7 @@ pub struct Meeting {
     /// Depth as `conventions` defines it. Where the ray misses, that of the surface's plane, kept within
     /// the range of its corners.
     pub depth: f64,
-    /// By how much another's depth may differ from `depth`.
+    /// By how much another's depth may differ from `depth`: rounding only.
     pub depth_slack: f64,
     /// Distance along the view axis that `depth` stands for, metres.
     pub distance: f64,
@@ -40,8 +47,11 @@ pub struct Meeting {
 }
 
 impl Meeting {
-    pub(super) fn slack(depth: f64, slope_per_px: f64) -> f64 {
-        depth * DEPTH_RELATIVE + slope_per_px * EDGE_PX
+    /// Depths of one surface lie within `range` of each other, however steep it is.
+    pub(super) fn slack(depth: f64, slope_per_px: f64, range: f64) -> f64 {
+        let slope = slope_per_px * DEPTH_PX;
+        // No number: the plane holds the eye.
+        depth * DEPTH_RELATIVE + if slope.is_finite() { slope.min(range) } else { range }
     }
 
     fn depth_matches(&self, depth: f32) -> bool {
@@ -101,6 +111,17 @@ impl Probe {
     }
 
     /// Whether `seen`, the surface and depth that another algorithm found at this pixel, can be true.
+    ///
+    /// Excused is what differs from the ray's answer and yet
+    ///
+    /// - is nothing, where every surface that the ray meets has an edge, or the edge of a hole, within [`EDGE_PX`];
+    /// - or is a surface that the ray meets or that has such an edge there, at its own depth within its
+    ///   [`Meeting::depth_slack`], and no surface is in front of it that the ray meets away from all such edges.
+    ///   In front is what is nearer than the depth that was *found* by more than its own slack: a pixel keeps the
+    ///   largest of the depths it is offered as they are after rounding, so that nothing else explains a farther
+    ///   one. Where several are as near as that, any of them may be seen, but of exact copies only the first.
+    ///
+    /// What is excused away from edges is therefore only the choice between surfaces that meet within rounding.
     pub fn judge(&self, seen: Option<(SurfaceId, f32)>) -> Judgement {
         match (seen, self.nearest()) {
             (None, None) => return Judgement::Agrees,
@@ -132,7 +153,7 @@ impl Probe {
             return Some(format!("its depth is {true_depth} within {depth_slack}"));
         }
         let hides = |m: &&Meeting| {
-            let nearer = m.depth > found.depth + m.depth_slack + found.depth_slack;
+            let nearer = m.depth - m.depth_slack > f64::from(depth);
             let earlier_copy = m.corners == found.corners && m.id < found.id;
             nearer || earlier_copy
         };
