@@ -16,6 +16,12 @@ hither render "$office" --camera open --size 480x270 --shade complexity --algori
 hither lines 'world:office?n=1' --camera corridor --faces flat --size 960x540 -o docs/pictures/office-lines.svg
 hither render world:hills --camera valley --size 960x540 --background $sky -o docs/pictures/hills.png
 
+# Maps of what occluder planes hide, in the manner of figures 10 and 11 of Coorg & Teller 1996.
+map() { hither cull "world:$1" --method planes --fov 75 --eye "$2" --target "$3" --map "docs/pictures/map-$1.svg"; }
+map soda 14.25,1.7,16.25 104,1.7,21
+map city -280,1.7,-440 100,1.7,200
+map tetra -6,1.7,-84 14,1.7,96
+
 # Figure 2c of Snyder & Lengyel 1997: needs Graphviz.
 above='--eye 0,5,0 --up 0,0,1'
 work=$(mktemp -d)

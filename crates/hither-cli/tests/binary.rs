@@ -532,7 +532,19 @@ fn cull_refuses_what_it_cannot_do() {
     refused(&["cull", WORLD, "--method", "exact", "--map", "x.svg"], 2, &["--map", "planes"]);
     refused(&["cull", WORLD, "--method", "planes", "--map", "x.png"], 2, &["x.png", ".svg"]);
     refused(&["cull", WORLD, "--method", "planes", "--occluders", "0"], 2, &["--occluders", "auto"]);
-    refused(&["cull", WORLD, "--method", "planes", "--reasons"], 2, &["--reasons", "buffer"]);
+    refused(&["cull", WORLD, "--method", "planes", "--coherence"], 2, &["--coherence", "buffer"]);
+    refused(&["cull", WORLD, "--method", "exact", "--reasons"], 2, &["--reasons", "buffer", "planes"]);
+    for method in ["buffer", "exact"] {
+        let planes_only = ["--around", "--paper", "--occluders=4", "--leaf=4", "--threads=2"];
+        for option in planes_only {
+            let name = option.split('=').next().unwrap();
+            refused(&["cull", WORLD, "--method", method, option], 2, &[name, "--method planes"]);
+        }
+    }
+    for option in ["--occluders=64", "--leaf=4"] {
+        let name = option.split('=').next().unwrap();
+        refused(&["cull", WORLD, "--method", "planes", "--paper", option], 2, &["--paper", name]);
+    }
     refused(&["cull", "world:office?n=33", "--method", "planes"], 1, &["539,055,000", "--method buffer"]);
     refused(&["cull", WORLD, "--size", "0x10"], 1, &["0x10"]);
     // The scene does not exist either; that the size is named shows which was looked at first.
@@ -563,4 +575,29 @@ fn cull_by_planes_writes_maps_and_hides_nothing_that_is_seen() {
     assert!(text.starts_with("<svg") && text.matches("<polygon").count() > 3601, "{}", text.len());
     let margin = visible("planes", &["--margin", "0.5"]);
     assert!(exact.iter().all(|i| margin.contains(i)));
+}
+
+#[test]
+fn cull_by_planes_says_how_each_polygon_was_judged() {
+    let arguments = ["cull", "world:soda", "--method", "planes", "--size", "320x200", "--reasons"];
+    let report: Value =
+        serde_json::from_slice(&done(&[&arguments, &["--json", "-"][..]].concat()).stdout).unwrap();
+    let frame = &report["frames"][0];
+    let polygons = frame["polygons"].as_array().unwrap();
+    assert!(polygons.len() == 1 && polygons[0]["instance"] == 0);
+    let lists = |state: &str| polygons[0][state].as_array().unwrap();
+    let (visible, partial) = (lists("visible"), lists("partial"));
+    let (hidden, outside) = (&polygons[0]["hidden"], &polygons[0]["outside"]);
+    let not_listed = hidden.as_u64().unwrap() + outside.as_u64().unwrap();
+    assert!(!visible.is_empty() && !partial.is_empty() && hidden != 0 && outside != 0, "{polygons:?}");
+    assert_eq!(frame["counters"]["polygons_hidden"], not_listed);
+    assert_eq!(frame["counters"]["polygons"], (visible.len() + partial.len()) as u64 + not_listed);
+    let triangles = || visible.iter().chain(partial).flat_map(|p| p.as_array().unwrap());
+    let mut different: Vec<u64> = triangles().map(|t| t.as_u64().unwrap()).collect();
+    different.sort_unstable();
+    different.dedup();
+    assert_eq!(different.len(), triangles().count());
+    assert!(different.last().unwrap() < &report["triangles"].as_u64().unwrap());
+    let line = String::from_utf8(done(&arguments).stdout).unwrap();
+    assert!(line.contains(&format!("{} visible, {} partial", visible.len(), partial.len())), "{line}");
 }

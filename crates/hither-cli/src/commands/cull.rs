@@ -42,7 +42,7 @@ pub struct Arguments {
     /// Start each frame with what hid something in the last (method buffer)
     #[arg(long)]
     coherence: bool,
-    /// Also say of each instance why it was judged as it was (method buffer)
+    /// Also say of each instance why it was judged as it was (method buffer), or of each polygon how (planes)
     #[arg(long)]
     reasons: bool,
     #[command(flatten)]
@@ -68,6 +68,7 @@ enum MethodName {
 struct Found {
     visible: Vec<u32>,
     reasons: Option<Value>,
+    polygons: Option<planes::Polygons>,
     counters: Value,
     time: Duration,
 }
@@ -116,8 +117,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn check(arguments: &Arguments) -> Result<(), Failure> {
     let buffer = arguments.method == MethodName::Buffer;
-    if !buffer && (arguments.reasons || arguments.coherence) {
-        return Err(Failure::usage("--reasons and --coherence go with --method buffer"));
+    if !buffer && arguments.coherence {
+        return Err(Failure::usage("--coherence goes with --method buffer"));
+    }
+    if arguments.method == MethodName::Exact && arguments.reasons {
+        return Err(Failure::usage("--reasons goes with --method buffer or planes"));
     }
     if !buffer && arguments.coarse > 1 {
         return Err(Failure::usage("--coarse goes with --method buffer"));
@@ -136,7 +140,7 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.method == MethodName::Exact && arguments.margin > 0.0 {
         return Err(Failure::usage("--margin goes with --method buffer or planes"));
     }
-    Ok(())
+    arguments.planes.check(arguments.method)
 }
 
 /// A method with what it keeps from frame to frame.
@@ -180,7 +184,8 @@ impl Method {
                     };
                     found.judged.iter().map(entry).collect::<Vec<_>>().into()
                 });
-                Ok(Found { visible: found.visible, reasons, counters: counters(&found.counters), time })
+                let counters = counters(&found.counters);
+                Ok(Found { visible: found.visible, reasons, polygons: None, counters, time })
             }
             Method::Planes(planes) => planes.find(index, view),
             Method::Exact(renderer) => {
@@ -191,7 +196,7 @@ impl Method {
                 let visible = Seen::instances_of(&frame);
                 let counters = report::counters(&frame.counters);
                 renderer.recycle(frame);
-                Ok(Found { visible, reasons: None, counters, time })
+                Ok(Found { visible, reasons: None, polygons: None, counters, time })
             }
         }
     }
@@ -207,7 +212,10 @@ fn say(
     let all = index.scene().instance_count();
     let time = short(found.time.as_secs_f64() * 1e3);
     let seen = grouped(found.visible.len() as u64);
-    let line = format!("frame {number}: {seen} of {} could be seen; {time} ms", count(all, "instance"));
+    let mut line = format!("frame {number}: {seen} of {} could be seen; {time} ms", count(all, "instance"));
+    if let Some(polygons) = &found.polygons {
+        line += &format!("; {}", polygons.line());
+    }
     match to {
         None if verbosity != Verbosity::Quiet => console::print(&format!("{line}\n")),
         None => Ok(()),
@@ -234,6 +242,9 @@ fn frame_json(index: &SceneIndex, found: &Found, number: u32, time: Option<f64>,
     });
     if let (Some(reasons), Some(frame)) = (&found.reasons, frame.as_object_mut()) {
         frame.insert("reasons".into(), reasons.clone());
+    }
+    if let (Some(polygons), Some(frame)) = (&found.polygons, frame.as_object_mut()) {
+        frame.insert("polygons".into(), polygons.json());
     }
     frame
 }

@@ -147,6 +147,9 @@ impl View {
         if !self.view_from_world.is_finite() {
             return Err(ViewError::Camera("its position and direction must be finite numbers"));
         }
+        if is_singular(&self.view_from_world.matrix3) {
+            return Err(ViewError::Camera("its matrix flattens space: it must have an inverse"));
+        }
         match self.projection {
             Projection::Perspective { fov_y, near } => {
                 if !(fov_y > 0.0 && fov_y < std::f64::consts::PI) {
@@ -166,5 +169,54 @@ impl View {
             }
         }
         Ok(())
+    }
+}
+
+/// Whether a matrix of finite numbers has no inverse, or one of rounding alone. Scales that are tiny or differ are no
+/// reason: rows, then columns, are first brought to a largest entry of 1. Then a determinant in f64, of entries that
+/// are themselves rounded, is wrong by less than 10⁻¹⁴.
+fn is_singular(matrix: &DMat3) -> bool {
+    let scaled = |v: DVec3| v / v.abs().max_element();
+    let rows = matrix.transpose();
+    let rows = DMat3::from_cols(scaled(rows.x_axis), scaled(rows.y_axis), scaled(rows.z_axis));
+    let columns = rows.transpose();
+    let even = DMat3::from_cols(scaled(columns.x_axis), scaled(columns.y_axis), scaled(columns.z_axis));
+    let determinant = even.determinant().abs();
+    // A row or column of zeros has made it no number.
+    determinant.is_nan() || determinant < 1e-14
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A view whose pose turns, then scales by `scale` along its own axes, then turns again.
+    fn scaled(scale: DVec3) -> View {
+        let turn = |angle| DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), angle);
+        let matrix3 = turn(0.7) * DMat3::from_diagonal(scale) * turn(-2.0);
+        let projection = Projection::Perspective { fov_y: 1.0, near: 0.1 };
+        let view_from_world = DAffine3 { matrix3, translation: DVec3::new(1.0, -2.0, 3.0) };
+        View { view_from_world, projection, width: 64, height: 48 }
+    }
+
+    #[test]
+    fn a_pose_that_flattens_space_is_refused_and_tiny_scales_are_not() {
+        let along_axes = |scale| View { view_from_world: DAffine3::from_scale(scale), ..scaled(DVec3::ONE) };
+        let flat = [DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.0, 1e-9, 1.0), DVec3::Y * 1e200];
+        for scale in flat {
+            for view in [scaled(scale), along_axes(scale)] {
+                let refused = view.validate();
+                assert!(matches!(refused, Err(ViewError::Camera(why)) if why.contains("inverse")), "{scale}");
+            }
+        }
+        for size in [1e-300, 1e-120, 1e-9, 1.0, 1e9, 1e300] {
+            for scale in [DVec3::ONE, DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 1e-3, 1e-6)] {
+                assert_eq!(scaled(scale * size).validate(), Ok(()), "{scale} {size}");
+                assert_eq!(along_axes(scale * size).validate(), Ok(()), "{scale} {size}");
+            }
+        }
+        for tiny in [1e-12, 1e-15, 1e-100, 1e-300] {
+            assert_eq!(along_axes(DVec3::new(1.0, tiny, 1.0)).validate(), Ok(()), "{tiny}");
+        }
     }
 }

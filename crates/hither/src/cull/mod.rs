@@ -2,13 +2,13 @@
 //!
 //! [`OcclusionBuffer`] is the small interface that an engine wants: draw occluders, ask about boxes, balls,
 //! rectangles and meshes, in any order. What it calls hidden is hidden in the continuous image, whatever the
-//! buffer's resolution. [`Culler`] does that for a whole scene: it chooses the occluders and returns the instances
-//! that may be seen, front to back.
+//! buffer's resolution; [`buffer`] says why. [`Culler`] does that for a whole scene: it chooses the occluders
+//! and returns the instances that may be seen, front to back.
 //!
 //! [`planes`] needs no image and has no resolution: large polygons near the eye cast shadows, and what lies
 //! wholly in a shadow is hidden [Coorg & Teller 1996].
 
-mod buffer;
+pub mod buffer;
 mod closed;
 pub mod planes;
 mod scene;

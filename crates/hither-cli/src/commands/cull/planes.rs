@@ -2,11 +2,11 @@
 
 use super::{Arguments, Found, MethodName};
 use crate::failure::Failure;
-use crate::numbers::grouped;
+use crate::numbers::{count, grouped};
 use crate::outputs;
 use glam::DAffine3;
 use hither::conventions::View;
-use hither::cull::planes::{Amount, Culled, PlaneCuller, PlanesOptions};
+use hither::cull::planes::{Amount, Culled, PlaneCuller, PlanesOptions, State};
 use hither::{Scene, SceneIndex};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -30,10 +30,33 @@ pub struct Options {
     /// Only the paper's own tests: single and connected occluders, 32 of them, against boxes
     #[arg(long, help_heading = "Planes")]
     paper: bool,
-    /// Worker threads; 0 is one for each core
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u16).range(..=1024),
-          help_heading = "Planes")]
-    threads: u16,
+    /// Worker threads; 0 is one for each core [default: 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(..=1024), help_heading = "Planes")]
+    threads: Option<u16>,
+}
+
+impl Options {
+    /// Refuses what the method would not look at, and what contradicts itself.
+    pub fn check(&self, method: MethodName) -> Result<(), Failure> {
+        let given = [
+            ("--map", self.map.is_some()),
+            ("--around", self.around),
+            ("--occluders", self.occluders.is_some()),
+            ("--leaf", self.leaf.is_some()),
+            ("--paper", self.paper),
+            ("--threads", self.threads.is_some()),
+        ];
+        let first = given.iter().find(|(_, given)| *given);
+        if let (Some((option, _)), true) = (first, method != MethodName::Planes) {
+            return Err(Failure::usage(format!("{option} goes with --method planes")));
+        }
+        if self.paper && (self.occluders.is_some() || self.leaf.is_some()) {
+            return Err(Failure::usage(
+                "--paper means 32 occluders and leaves of 8 polygons: it goes without --occluders and --leaf",
+            ));
+        }
+        Ok(())
+    }
 }
 
 /// Every polygon of every instance is kept.
@@ -56,9 +79,6 @@ pub fn check_scene(scene: &Scene, source: &str) -> Result<(), Failure> {
 /// Refuses a map that could not be written, before any work.
 pub fn check_map(arguments: &Arguments) -> Result<(), Failure> {
     let Some(map) = &arguments.planes.map else { return Ok(()) };
-    if arguments.method != MethodName::Planes {
-        return Err(Failure::usage("--map goes with --method planes"));
-    }
     if !outputs::has_extension(map, "svg") {
         return Err(Failure::usage(format!("--map {}: give the file the extension .svg", map.display())));
     }
@@ -79,6 +99,7 @@ pub struct Planes {
     options: PlanesOptions,
     margin: f64,
     around: bool,
+    reasons: bool,
     map: Option<PathBuf>,
     /// Where everything was when the tree was made.
     poses: Vec<DAffine3>,
@@ -92,7 +113,7 @@ impl Planes {
         let options = PlanesOptions {
             occluders: wanted.occluders.unwrap_or(own.occluders),
             leaf_polygons: wanted.leaf.unwrap_or(own.leaf_polygons),
-            threads: usize::from(wanted.threads),
+            threads: usize::from(wanted.threads.unwrap_or(1)),
             ..own
         };
         Planes {
@@ -100,6 +121,7 @@ impl Planes {
             options,
             margin: arguments.margin,
             around: wanted.around,
+            reasons: arguments.reasons,
             map: wanted.map.clone(),
             poses: poses(index.scene()),
         }
@@ -122,7 +144,9 @@ impl Planes {
         };
         let culled = culled.map_err(|e| Failure::work(e.to_string()))?;
         let time = start.elapsed();
-        Ok(Found { visible: self.instances(&culled), reasons: None, counters: self.counters(&culled), time })
+        let visible = self.instances(&culled);
+        let polygons = self.reasons.then(|| self.polygons(index));
+        Ok(Found { visible, reasons: None, polygons, counters: self.counters(&culled), time })
     }
 
     /// Writes the map of the last frame, if one is asked for.
@@ -146,6 +170,21 @@ impl Planes {
         seen.into_iter().map(|s| s.0).collect()
     }
 
+    /// What the last look knows of every polygon.
+    fn polygons(&self, index: &SceneIndex) -> Polygons {
+        let (scene, model) = (index.scene(), self.culler.model());
+        let mut triangles = vec![Vec::new(); model.polygons().len()];
+        for (number, instance) in (0..).zip(scene.instances()) {
+            let mesh = &scene.meshes[instance.mesh as usize];
+            for triangle in 0..mesh.triangles.len() as u32 {
+                triangles[model.polygon_of(number, triangle) as usize].push(triangle);
+            }
+        }
+        let instances = model.polygons().iter().map(|p| p.instance);
+        let all = instances.zip(self.culler.polygon_states()).zip(triangles);
+        Polygons(all.map(|((instance, state), triangles)| Judged { instance, state, triangles }).collect())
+    }
+
     fn counters(&self, culled: &Culled) -> Value {
         let (work, all) = (&culled.work, self.culler.model().polygons().len());
         json!({
@@ -162,6 +201,52 @@ impl Planes {
             "nodes_hidden_by_separate": work.hidden_by_fusion,
         })
     }
+}
+
+/// How each polygon was judged; those of an instance follow one another.
+pub struct Polygons(Vec<Judged>);
+
+struct Judged {
+    instance: u32,
+    state: State,
+    triangles: Vec<u32>,
+}
+
+impl Polygons {
+    /// How many polygons there are of each kind.
+    pub fn line(&self) -> String {
+        let of = |state| grouped(counted(&self.0, state) as u64);
+        format!(
+            "of {} {} visible, {} partial, {} hidden, {} outside the view",
+            count(self.0.len() as u64, "polygon"),
+            of(State::Visible),
+            of(State::Partial),
+            of(State::Hidden),
+            of(State::Outside)
+        )
+    }
+
+    /// An entry for each instance: what of it may be seen as lists of triangles, the rest as numbers.
+    pub fn json(&self) -> Value {
+        let entry = |of_instance: &[Judged]| {
+            let listed = |state| {
+                let polygons = of_instance.iter().filter(|j| j.state == state);
+                polygons.map(|j| j.triangles.as_slice()).collect::<Vec<_>>()
+            };
+            json!({
+                "instance": of_instance[0].instance,
+                "visible": listed(State::Visible),
+                "partial": listed(State::Partial),
+                "hidden": counted(of_instance, State::Hidden),
+                "outside": counted(of_instance, State::Outside),
+            })
+        };
+        self.0.chunk_by(|a, b| a.instance == b.instance).map(entry).collect::<Vec<_>>().into()
+    }
+}
+
+fn counted(polygons: &[Judged], state: State) -> usize {
+    polygons.iter().filter(|j| j.state == state).count()
 }
 
 fn poses(scene: &Scene) -> Vec<DAffine3> {

@@ -3,8 +3,9 @@
 //! # What is promised
 //!
 //! [`Verdict::Hidden`] means: every ray from the eye to a point of what was asked about meets an occluder
-//! before that point. Whatever the resolution of the buffer, whatever the order of drawing. The error is on the
-//! side of *visible*. Three bounds carry it:
+//! before that point. Whatever the resolution of the buffer, whatever the order of drawing; and what is hidden stays
+//! hidden when more is drawn, for depths are only ever raised. The error is on the side of *visible*. Three
+//! bounds carry it:
 //!
 //! - **coverage**: a pixel counts as covered only if all of its square is;
 //! - **depth**: a pixel holds no more than the depth of the nearest surface anywhere in its square;
@@ -30,7 +31,7 @@
 //! there: its other edges do not come near, so nobody else's sum changes.
 //!
 //! *Snapping.* Corners are off by at most a slack of δ (1/256 pixel, more where f64 is not enough: see
-//! [`place`]). Moving them to where they truly are is a homotopy of the chain. N at c changes only if an edge
+//! `place`). Moving them to where they truly are is a homotopy of the chain. N at c changes only if an edge
 //! passes over c; then c is within δ of it, the edge touches the square, and it has been taken off the count,
 //! because *touches* widens the square by δ and *inner side* begins δ beyond the edge. An edge that passes over
 //! c and is then crossed on the way to q gives back what it took. A face that snapping turned over counts as it
@@ -49,14 +50,16 @@
 //! # Four ways to draw a patch
 //!
 //! All rest on the same inequality; they differ in what they need not look at. A patch of one face ends at every
-//! edge, so a pixel is covered where it lies inside all of them ([`loose`]); of a closed convex patch of few faces, wholly
-//! beyond the near plane, where it lies inside all edges of the silhouette ([`convex`]). In a patch of faces that are not large
+//! edge, so a pixel is covered where it lies inside all of them (`loose`); of a closed convex patch of few faces, wholly
+//! beyond the near plane, where it lies inside all edges of the silhouette (`convex`). In a patch of faces that are not large
 //! N(c) is counted from the outline alone, and each face lowers depth in the whole rectangle around it, to its plane
-//! or to its farthest corner ([`mosaic`]). Else each face is filled, and only pixels that shared edges cross are
-//! counted ([`fill`]). In both, whole blocks that are covered raise one number, and only what is covered in part raises
+//! or to its farthest corner (`mosaic`). Else each face is filled, and only pixels that shared edges cross are
+//! counted (`fill`). In both, whole blocks that are covered raise one number, and only what is covered in part raises
 //! pixels.
 //!
-//! What of a closed patch is not worth drawing may still hide by boxes that lie inside of it ([`inner`]): from outside
+//! The names in brackets are of the files that draw so.
+//!
+//! What of a closed patch is not worth drawing may still hide by boxes that lie inside of it (`inner`): from outside
 //! the patch's bounding box, what such a box hides, the patch hides.
 //!
 //! # Sampled
@@ -112,7 +115,74 @@ use place::Sizes;
 /// What may be chosen about an [`OcclusionBuffer`].
 #[derive(Clone, Copy, Debug)]
 pub struct OcclusionOptions {
-    /// How far the eye may move, metres, while answers are to stay true. It must not turn.
+    /// How far the eye may move, metres, while answers are to stay true. It must not turn: the view has borders.
+    ///
+    /// # A frame of latency
+    ///
+    /// Where the picture is drawn after the camera has gone on, moving by up to r metres and turning by up to φ about
+    /// any axis through the eye, ask a buffer of a wider view. With h and v half the fields of view of the picture, the
+    /// halves of the wider view, at the same place and turn, are
+    ///
+    /// ```text
+    /// h' = h + asin(sin φ · √(1 + tan²v · cos²h))
+    /// v' = v + asin(sin φ · √(1 + tan²h · cos²v))
+    /// ```
+    ///
+    /// A direction of the picture in its corner is what comes nearest to the turned border, so that adding φ to each
+    /// half, 2φ to each field of view, is not enough. A near plane that turns cuts differently, too: with the same
+    /// `near`, `eye_moves` is r + near · (√(1 + tan²h' + tan²v') − 1). For then an occluder counts only if it is no nearer
+    /// than near / cos Θ + r, Θ being half the wider view's diagonal, and so lies beyond the turned near plane
+    /// wherever the picture shows it; and what the picture shows, beyond near · cos Θ − r, is not taken for outside.
+    ///
+    /// ```
+    /// use hither::conventions::{Projection, View};
+    ///
+    /// /// The view to cull with, and its `eye_moves`. None if it would see half of space or more.
+    /// fn with_latency(view: &View, turns: f64, moves: f64) -> Option<(View, f64)> {
+    ///     let Projection::Perspective { fov_y, near } = view.projection else { return None };
+    ///     let v = fov_y / 2.0;
+    ///     let h = (v.tan() * f64::from(view.width) / f64::from(view.height)).atan();
+    ///     let wider = |half: f64, other: f64| {
+    ///         half + (turns.sin() * (1.0 + (other.tan() * half.cos()).powi(2)).sqrt()).asin()
+    ///     };
+    ///     let (h, v) = (wider(h, v), wider(v, h));
+    ///     let in_range = |half: f64| half < std::f64::consts::FRAC_PI_2;
+    ///     if !(turns >= 0.0 && in_range(h) && in_range(v)) {
+    ///         return None;
+    ///     }
+    ///     // Pixels are square: the width says how wide the view is.
+    ///     let width = (f64::from(view.height) * h.tan() / v.tan()).ceil();
+    ///     let wide = width / f64::from(view.height) * v.tan();
+    ///     let moves = moves + near * ((1.0 + wide.powi(2) + v.tan().powi(2)).sqrt() - 1.0);
+    ///     let projection = Projection::Perspective { fov_y: 2.0 * v, near };
+    ///     Some((View { projection, width: width as u32, ..*view }, moves))
+    /// }
+    /// # use glam::{DMat3, DVec3};
+    /// # let projection = Projection::Perspective { fov_y: 1.2, near: 0.1 };
+    /// # let view = View::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, (1920, 1080));
+    /// # let halves = |view: &View| {
+    /// #     let Projection::Perspective { fov_y, .. } = view.projection else { unreachable!() };
+    /// #     let v = (fov_y / 2.0).tan();
+    /// #     (v * f64::from(view.width) / f64::from(view.height), v)
+    /// # };
+    /// # let (x, y) = halves(&view);
+    /// # let (mut reached, mut by_twice_the_turn) = (0.0_f64, 0.0_f64);
+    /// # for turn in [0.01, 0.05, 0.2] {
+    /// #     let (wide, margin) = with_latency(&view, turn, 0.5).unwrap();
+    /// #     assert!(wide.validate().is_ok() && margin > 0.5);
+    /// #     let (wide_x, wide_y) = halves(&wide);
+    /// #     for i in 0..10_000 {
+    /// #         let (a, b) = (f64::from(i % 100) * 0.0628, f64::from(i / 100) * 0.0314);
+    /// #         let axis = DVec3::new(a.cos() * b.sin(), a.sin() * b.sin(), b.cos());
+    /// #         let corner = DMat3::from_axis_angle(axis, turn) * DVec3::new(x, y, -1.0);
+    /// #         let (to_x, to_y) = (corner.x / -corner.z, corner.y / -corner.z);
+    /// #         assert!(to_x <= wide_x * (1.0 + 1e-12) && to_y <= wide_y * (1.0 + 1e-12), "{turn} {axis}");
+    /// #         reached = reached.max(to_y / wide_y);
+    /// #         by_twice_the_turn = by_twice_the_turn.max(to_y / (y.atan() + turn).tan());
+    /// #     }
+    /// # }
+    /// # assert!(reached > 0.999 && by_twice_the_turn > 1.01, "{reached} {by_twice_the_turn}");
+    /// ```
     pub eye_moves: f64,
     /// How far each object, occluder or not, may move, metres, while answers are to stay true.
     pub objects_move: f64,
@@ -150,8 +220,8 @@ impl std::ops::AddAssign for Drawn {
 #[error("two occlusion buffers can be merged only if they have the same view and the same margins")]
 pub struct CannotMerge;
 
-/// A conservative occlusion buffer: draw occluders, ask what they hide, in any order. See the module's page for
-/// what *hidden* means and why it is true.
+/// A conservative occlusion buffer: draw occluders, ask what they hide, in any order. See
+/// [the module's page](crate::cull::buffer) for what *hidden* means and why it is true.
 ///
 /// Asking takes `&self`, so any number of threads may ask at once; [`SharedBuffer`] lets them draw meanwhile.
 #[derive(Clone, Debug)]

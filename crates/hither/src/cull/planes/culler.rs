@@ -41,13 +41,16 @@ pub struct PlaneCuller {
 pub(super) struct Sight {
     pub frame: Frame,
     pub memories: Vec<Memory>,
-    pub pieces_hidden: Vec<bool>,
+    /// Of each piece, in leaves whose state is partial.
+    pub pieces: Vec<State>,
     odometer: f64,
     /// How many occluders are used next; 0 until that is settled.
     occluders: usize,
     began: bool,
     chosen: Vec<(f64, u32, f64)>,
     seen: Vec<bool>,
+    /// The planes of the last view, none if it was all around.
+    frustum: Vec<(DVec3, f64)>,
     scratch: Scratch,
 }
 
@@ -175,6 +178,14 @@ impl PlaneCuller {
         self.occluders.all.len()
     }
 
+    /// What the last look knows of each polygon, by number; all outside before the first. Visible and partial ones
+    /// are those of [`Culled::visible`]; partial is that of which some part may be hidden. Of a polygon that the
+    /// view's border crosses the parts in the view count. Cost: all pieces.
+    pub fn polygon_states(&self) -> Vec<State> {
+        let sight = if self.foresaw { &self.future } else { &self.present };
+        sight.polygon_states(&self.tree, self.model.polygons().len())
+    }
+
     /// Forgets what is known of the nodes, as if the next eye were the first; not how many occluders paid.
     pub fn forget_nodes(&mut self) {
         self.present.memories.iter_mut().for_each(Memory::forget);
@@ -218,6 +229,8 @@ impl PlaneCuller {
     ) -> Culled {
         let PlaneCuller { options, model, occluders, tree, potential, present: sight, .. } = self;
         sight.move_to(eye, tree, model);
+        sight.frustum.clear();
+        sight.frustum.extend(limits.frustum.into_iter().flatten());
         best(occluders, potential.of(tree.leaf_of(eye)), eye, count, &mut sight.chosen);
         let usable = |o: &Occluder| limits.unseen.is_none_or(|unseen| keeps_clear(o, &unseen));
         sight.frame.begin(occluders, eye, reach, &sight.chosen, usable);
@@ -230,9 +243,9 @@ impl PlaneCuller {
             grain: if self.pool.is_some() { GRAIN } else { u32::MAX },
         };
         let ids: Vec<u32> = sight.frame.active.iter().map(|a| a.id).collect();
-        let (memories, pieces_hidden) = (&mut sight.memories, &mut sight.pieces_hidden);
+        let (memories, pieces) = (&mut sight.memories, &mut sight.pieces);
         let scratch = &mut sight.scratch;
-        let mut run = || visit(&context, Subtree { node: 0, memories, pieces_hidden }, &ids, scratch).0;
+        let mut run = || visit(&context, Subtree { node: 0, memories, pieces }, &ids, scratch).0;
         let work = match &self.pool {
             Some(pool) => pool.install(run),
             None => run(),
@@ -260,7 +273,7 @@ impl Sight {
             self.odometer += step * (1.0 + 1e-9);
         } else {
             self.memories = vec![Memory::default(); tree.nodes.len()];
-            self.pieces_hidden = vec![false; tree.pieces.len()];
+            self.pieces = vec![State::Outside; tree.pieces.len()];
             self.seen = vec![false; model.polygons().len()];
             self.began = true;
         }
@@ -274,12 +287,7 @@ impl Sight {
         culled: &mut Culled,
         mut gain: Option<&mut Gain>,
     ) {
-        let inside = |piece: usize| {
-            let points = tree.piece(piece);
-            frustum.is_none_or(|planes| {
-                planes.iter().all(|(n, offset)| points.iter().any(|p| n.dot(*p) >= *offset))
-            })
-        };
+        let inside = |piece: usize| frustum.is_none_or(|planes| is_inside(tree.piece(piece), planes));
         self.seen.fill(false);
         let mut at = 0usize;
         while let Some(node) = tree.nodes.get(at) {
@@ -312,7 +320,7 @@ impl Sight {
                         gain.note_pieces(memory, &self.frame);
                     }
                     for piece in pieces {
-                        if self.pieces_hidden[piece] {
+                        if self.pieces[piece] == State::Hidden {
                             culled.hidden_pieces += 1;
                         } else {
                             self.seen[tree.pieces[piece].polygon as usize] |= inside(piece);
@@ -325,6 +333,37 @@ impl Sight {
         let seen = self.seen.iter().zip(0u32..).filter(|(seen, _)| **seen);
         culled.visible.extend(seen.map(|(_, number)| number));
     }
+
+    /// What is known of each of so many polygons: of those parts of it that the view holds.
+    fn polygon_states(&self, tree: &Tree, count: usize) -> Vec<State> {
+        let mut states = vec![State::Outside; count];
+        let mut at = 0usize;
+        while let (Some(node), Some(memory)) = (tree.nodes.get(at), self.memories.get(at)) {
+            let settled = memory.outside || memory.state != State::Partial || node.right == 0;
+            at = if settled { node.end as usize } else { at + 1 };
+            if !settled || memory.outside {
+                continue;
+            }
+            for piece in node.pieces.0 as usize..node.pieces.1 as usize {
+                if !is_inside(tree.piece(piece), &self.frustum) {
+                    continue;
+                }
+                let of_piece = if memory.state == State::Partial { self.pieces[piece] } else { memory.state };
+                let of_polygon = &mut states[tree.pieces[piece].polygon as usize];
+                *of_polygon = match *of_polygon {
+                    State::Outside => of_piece,
+                    known if known == of_piece => known,
+                    _ => State::Partial,
+                };
+            }
+        }
+        states
+    }
+}
+
+/// Whether a convex piece may reach the inner side of all planes.
+fn is_inside(piece: &[DVec3], planes: &[(DVec3, f64)]) -> bool {
+    planes.iter().all(|(n, offset)| piece.iter().any(|p| n.dot(*p) >= *offset))
 }
 
 /// Whether an occluder stays out of the part of the view before the near plane, given by its corners.

@@ -7,6 +7,10 @@
 //! clipping of the paper's figure 2, of one occludee against the few occluders that partially hide it; the
 //! number of parts is bounded, and where it is exceeded, the occludee counts as seen.
 //!
+//! *Not monotone.* Only the first [`MOST_OCCLUDERS`] are tried, and at most [`MOST_PARTS`] parts looked at. One more
+//! occluder may take the place of one that was needed, or cut what is left into more parts: with more occluders in
+//! use, a polygon that was found hidden may count as seen again. More are hidden nearly always, and none wrongly.
+//!
 //! *Rounding.* What is dropped as inside must be inside by more than a margin; what is kept as outside is
 //! cut with twice that margin, so that the two overlap. Points are cut on segments between points of the
 //! occludee, so they stay in it.

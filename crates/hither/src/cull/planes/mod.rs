@@ -63,7 +63,8 @@ pub enum Amount {
     Automatic,
 }
 
-/// What is done to find hidden polygons. More costs time and hides more; nothing is ever hidden wrongly.
+/// What is done to find hidden polygons. More costs time and hides more, but see `fusion`; nothing is ever hidden
+/// wrongly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanesOptions {
     /// Occluders in use at once, the paper's k. At most 1,024.
@@ -75,7 +76,8 @@ pub struct PlanesOptions {
     pub threshold: f64,
     /// Let connected occluders hide together.
     pub connected: bool,
-    /// Let separate occluders hide together.
+    /// Let separate occluders hide together. The effort for each box and piece is bounded, so that this is not
+    /// monotone: with more occluders in use, one polygon or another that was found hidden may count as seen again.
     pub fusion: bool,
     /// Test the polygons of partially hidden leaves.
     pub pieces: bool,

@@ -48,32 +48,20 @@ impl PlaneCuller {
         let sight = if self.foresaw { &self.future } else { &self.present };
         let eye = sight.frame.eye;
         let mut view = TopView { eye: plan(eye), ..TopView::default() };
-        let mut states = vec![State::Outside; self.model.polygons().len()];
         let mut at = 0;
         while let (Some(node), Some(memory)) = (self.tree.nodes.get(at), sight.memories.get(at)) {
             let state = if memory.outside { State::Outside } else { memory.state };
             let settled = state != State::Partial || node.right == 0;
             if settled && !node.bounds.is_empty() {
                 view.boxes.push(TopViewBox { corners: flat(&node.bounds), state });
-                for piece in node.pieces.0 as usize..node.pieces.1 as usize {
-                    let polygon = &mut states[self.tree.pieces[piece].polygon as usize];
-                    let partial = state == State::Partial;
-                    if state == State::Visible || (partial && !sight.pieces_hidden[piece]) {
-                        *polygon = State::Visible;
-                    } else if state != State::Outside && *polygon == State::Outside {
-                        *polygon = State::Hidden;
-                    }
-                }
             }
             at = if settled { node.end as usize } else { at + 1 };
         }
-        let numbers = 0..self.model.polygons().len() as u32;
-        view.polygons = numbers
-            .map(|p| TopViewPolygon {
-                corners: self.model.corners(p).map(plan).collect(),
-                state: states[p as usize],
-            })
-            .collect();
+        let polygon = |(number, state): (u32, State)| TopViewPolygon {
+            corners: self.model.corners(number).map(plan).collect(),
+            state: if state == State::Partial { State::Visible } else { state },
+        };
+        view.polygons = (0..).zip(self.polygon_states()).map(polygon).collect();
         view.occluders = sight.frame.active.iter().map(|active| self.outline(active.id / 2)).collect();
         view.leaf = self.tree.leaf_of(eye).map(|leaf| flat(&self.tree.nodes[leaf as usize].cell));
         view

@@ -30,7 +30,7 @@ use super::tree::Tree;
 use crate::geometry::Aabb;
 use glam::DVec3;
 
-/// What is known of a node.
+/// What is known of a node, or of a polygon.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum State {
     /// Not looked at: outside the frustum, or below a node that is settled.
@@ -145,8 +145,8 @@ pub(super) struct Subtree<'a> {
     pub node: u32,
     /// Of its nodes, in order.
     pub memories: &'a mut [Memory],
-    /// Of its pieces, in order: whether a piece is hidden, in leaves whose state is partial.
-    pub pieces_hidden: &'a mut [bool],
+    /// Of its pieces, in order: what is known of each, in leaves whose state is partial.
+    pub pieces: &'a mut [State],
 }
 
 /// Memory that is used again; one for each thread's line of work.
@@ -197,7 +197,7 @@ pub(super) fn visit(
     let passed = memory.passed.as_slice();
     if node.right == 0 {
         if !remembered {
-            let of_leaf = (node.pieces, subtree.pieces_hidden, &mut memory.hidden_by);
+            let of_leaf = (node.pieces, subtree.pieces, &mut memory.hidden_by);
             let holds = test_pieces(context, of_leaf, passed, scratch, &mut work);
             memory.until = memory.until.min(context.odometer + holds);
             memory.until_below = memory.until;
@@ -211,9 +211,9 @@ pub(super) fn visit(
         let (first, _) = node.pieces;
         (context.tree.nodes[node.right as usize].pieces.0 - first) as usize
     };
-    let (left_hidden, right_hidden) = subtree.pieces_hidden.split_at_mut(left_pieces);
-    let left = Subtree { node: subtree.node + 1, memories: left, pieces_hidden: left_hidden };
-    let right = Subtree { node: node.right, memories: right, pieces_hidden: right_hidden };
+    let (left_states, right_states) = subtree.pieces.split_at_mut(left_pieces);
+    let left = Subtree { node: subtree.node + 1, memories: left, pieces: left_states };
+    let right = Subtree { node: node.right, memories: right, pieces: right_states };
     let small = node.end - subtree.node < context.grain;
     let (one, other) = if small {
         (visit(context, left, passed, scratch), visit(context, right, passed, scratch))
@@ -296,15 +296,15 @@ fn classify(
 /// hide it, the least of them. Returns how long all that was found holds.
 fn test_pieces(
     context: &Context,
-    (pieces, hidden, hidden_by): ((u32, u32), &mut [bool], &mut Vec<u32>),
+    (pieces, states, hidden_by): ((u32, u32), &mut [State], &mut Vec<u32>),
     passed: &[u32],
     scratch: &mut Scratch,
     work: &mut Work,
 ) -> f64 {
     let mut holds = f64::INFINITY;
     hidden_by.clear();
-    for (piece, hidden) in (pieces.0..pieces.1).zip(hidden) {
-        *hidden = false;
+    for (piece, state) in (pieces.0..pieces.1).zip(states) {
+        *state = State::Partial;
         if !context.tests.pieces {
             continue;
         }
@@ -316,8 +316,12 @@ fn test_pieces(
         work.piece_relations += passed.len() as u64;
         let (verdict, this_holds) =
             hide(context, &occludee, passed, scratch, work, |outline| outline.extend_from_slice(&points));
-        *hidden = matches!(verdict, Verdict::HiddenBy(_));
-        if *hidden {
+        *state = match verdict {
+            Verdict::Visible => State::Visible,
+            Verdict::Partial => State::Partial,
+            Verdict::HiddenBy(_) => State::Hidden,
+        };
+        if *state == State::Hidden {
             let active = |slot: &u16| &context.frame.active[usize::from(*slot)];
             hidden_by.extend(scratch.used.iter().map(active).max_by_key(|a| a.rank).map(|a| a.id));
         }

@@ -2,7 +2,7 @@
 
 use super::{scene_of, sign, wall};
 use crate::conventions::{Projection, View};
-use crate::cull::planes::{Amount, Culled, PlaneCuller, PlanesError, PlanesOptions};
+use crate::cull::planes::{Amount, Culled, PlaneCuller, PlanesError, PlanesOptions, State};
 use crate::scene::{AlphaMode, Content, Node, Scene};
 use glam::DVec3;
 
@@ -196,4 +196,23 @@ fn bad_input_is_refused() {
     assert!(empty.look_around(EYE).unwrap().visible.is_empty());
     let none = PlanesOptions { occluders: Amount::Fixed(0), ..PlanesOptions::default() };
     assert_eq!(look(&scene, &none, EYE).visible, [0]);
+}
+
+#[test]
+fn each_polygon_is_visible_partial_hidden_or_outside() {
+    let scene = scene_of(&[
+        wall(-1.0, -5.0, 1.0, -5.0),
+        sign(0.0, 1.5, -8.0),
+        wall(0.0, -9.0, 4.0, -9.0),
+        sign(3.0, 1.5, -5.0),
+        sign(0.0, 1.5, 4.0),
+    ]);
+    let mut culler = PlaneCuller::new(&scene, &PlanesOptions::default());
+    assert_eq!(culler.polygon_states(), [State::Outside; 5]);
+    culler.look_around(EYE).unwrap();
+    let [wall, behind, half, beside] = [State::Visible, State::Hidden, State::Partial, State::Visible];
+    assert_eq!(culler.polygon_states(), [wall, behind, half, beside, State::Visible]);
+    let projection = Projection::Perspective { fov_y: 1.5, near: 0.1 };
+    culler.look(&View::look_at(EYE, DVec3::new(0.0, 1.5, -1.0), DVec3::Y, projection, (100, 100))).unwrap();
+    assert_eq!(culler.polygon_states(), [wall, behind, half, beside, State::Outside]);
 }

@@ -1,7 +1,7 @@
 //! Against exact visibility: nothing that can be seen is called hidden, from awkward places in awkward scenes.
 
 use crate::conventions::Projection;
-use crate::cull::planes::{Culled, PlaneCuller, PlanesOptions};
+use crate::cull::planes::{Culled, PlaneCuller, PlanesOptions, State};
 use crate::reference::Caster;
 use crate::reference::all_around::sightings;
 use crate::reference::trouble::{self, Random};
@@ -72,6 +72,9 @@ fn what_a_ray_meets_in_a_view_is_never_hidden() {
         }
         let mut culler = PlaneCuller::new(&scene, &PlanesOptions::default());
         let culled = culler.look(&view).unwrap();
+        let seen = |state: &State| matches!(state, State::Visible | State::Partial);
+        let states = (0..).zip(culler.polygon_states()).filter(|(_, state)| seen(state));
+        assert!(states.map(|(polygon, _)| polygon).eq(culled.visible.iter().copied()), "seed {seed}");
         let caster = Caster::new(&scene, &view);
         for (x, y) in
             (0..view.height).step_by(3).flat_map(|y| (0..view.width).step_by(3).map(move |x| (x, y)))
