@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 mod asked;
 mod far;
+mod shared;
 
 /// A buffer with everything of `scene` drawn into it.
 fn drawn(scene: &Scene, view: &View, options: &OcclusionOptions) -> OcclusionBuffer {

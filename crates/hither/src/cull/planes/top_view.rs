@@ -34,7 +34,7 @@ pub struct TopViewBox {
 pub struct TopViewPolygon {
     /// Corners.
     pub corners: Vec<DVec2>,
-    /// Visible if it may be seen, hidden, or outside the view.
+    /// As of [`PlaneCuller::polygon_states`].
     pub state: State,
 }
 
@@ -59,7 +59,7 @@ impl PlaneCuller {
         }
         let polygon = |(number, state): (u32, State)| TopViewPolygon {
             corners: self.model.corners(number).map(plan).collect(),
-            state: if state == State::Partial { State::Visible } else { state },
+            state,
         };
         view.polygons = (0..).zip(self.polygon_states()).map(polygon).collect();
         view.occluders = sight.frame.active.iter().map(|active| self.outline(active.id / 2)).collect();
