@@ -34,6 +34,26 @@ impl SharedBuffer {
         Ok(SharedBuffer { frame, rows, bands: (0..view.height).step_by(rows as usize).map(band).collect() })
     }
 
+    /// Makes it empty.
+    pub fn clear(&mut self) {
+        for band in &mut self.bands {
+            band.get_mut().unwrap_or_else(|broken| broken.into_inner()).clear();
+        }
+    }
+
+    /// Makes it empty and looks from elsewhere; with another size than before it is made anew, in as many bands.
+    pub fn look(&mut self, view: &View) -> Result<(), ViewError> {
+        let before = &self.frame.view;
+        if (before.width, before.height) != (view.width, view.height) {
+            let options = self.frame.options;
+            *self = SharedBuffer::new(view, &options, self.bands.len())?;
+            return Ok(());
+        }
+        self.frame = Frame::new(view, &self.frame.options)?;
+        self.clear();
+        Ok(())
+    }
+
     /// Draws an occluder; see [`OcclusionBuffer::draw`](super::OcclusionBuffer::draw). What is counted is
     /// counted in every band.
     pub fn draw(&self, occluder: &Occluder, world_from_object: &DAffine3) -> Drawn {
@@ -91,6 +111,14 @@ impl SharedBuffer {
     pub fn depth(&self, x: u32, y: u32) -> f32 {
         let band = self.bands[(y / self.rows) as usize].read().unwrap_or_else(|broken| broken.into_inner());
         band.surface.depth(x, y % self.rows)
+    }
+
+    /// All depths, row by row.
+    pub fn depths(&self) -> Vec<f32> {
+        let bands = self.read();
+        let view = &self.frame.view;
+        let pixels = (0..view.height).flat_map(|y| (0..view.width).map(move |x| (x, y)));
+        pixels.map(|(x, y)| bands[(y / self.rows) as usize].surface.depth(x, y % self.rows)).collect()
     }
 
     fn read(&self) -> Vec<RwLockReadGuard<'_, Band>> {

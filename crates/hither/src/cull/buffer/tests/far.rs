@@ -95,3 +95,75 @@ fn nothing_drawn_hides_nothing_wherever_the_eye_is() {
     }
     assert!(visible > 10_000 && outside > 1000, "{visible} visible, {outside} outside");
 }
+
+/// A scene moved so far from the origin, its eye with it: by its nodes, or by the coordinates of its meshes, which f32
+/// rounds.
+fn moved_away(scene: &mut Scene, view: &mut View, offset: DVec3, in_meshes: bool) {
+    let away = DAffine3::from_translation(offset);
+    view.view_from_world = view.view_from_world * away.inverse();
+    let root = scene.root as usize;
+    if in_meshes {
+        // Each instance becomes a mesh of its own.
+        let instances = scene.instances();
+        let meshes = instances.iter().map(|instance| {
+            let mut mesh = scene.meshes[instance.mesh as usize].clone();
+            let at = away * instance.world_from_mesh;
+            mesh.positions.iter_mut().for_each(|p| *p = at.transform_point3(p.as_dvec3()).as_vec3());
+            if instance.world_from_mesh.matrix3.determinant() < 0.0 {
+                mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+            }
+            mesh
+        });
+        scene.meshes = meshes.collect();
+        scene.groups[root].nodes.clear();
+        for mesh in 0..instances.len() as u32 {
+            scene.groups[root].push(Node { content: Content::Mesh(mesh), ..Node::default() });
+        }
+    } else {
+        for node in scene.groups[root].nodes.iter_mut().filter(|n| n.parent.is_none()) {
+            node.local = Transform::Affine(away * node.local.matrix());
+        }
+    }
+}
+
+#[test]
+fn no_pixel_holds_more_than_is_there_far_from_the_origin() {
+    let random = &mut Random::new(5);
+    let (mut covered, mut shot) = (0, 0);
+    for seed in 0..900u64 {
+        let (mut scene, mut view) = match seed % 3 {
+            0 => rubble(seed),
+            1 => bodies(seed),
+            _ => (trouble::scene(seed), trouble::view(seed)),
+        };
+        let away = [1e2, 1e3, 1e4, 1e5, 1e6, 5.5e6][random.below(6) as usize];
+        let offset = random.point(1.0).normalize_or(DVec3::X) * away;
+        moved_away(&mut scene, &mut view, offset, random.one_in(2));
+        let (c, s) = attack(&scene, &view, random, 4, &format!("seed {seed}, {away} m away"));
+        (covered, shot) = (covered + c, shot + s);
+    }
+    assert!(covered > 50_000 && shot > 200_000, "{covered} pixels, {shot} rays");
+}
+
+/// Few vertices and many triangles among them: edges with three triangles and more, triangles that are there twice or
+/// the other way round, or have no area.
+fn tangle(seed: u64) -> (Scene, View) {
+    let random = &mut Random::new(seed);
+    let mut scene = Scene::new("tangle");
+    scene.materials = vec![Material { double_sided: random.one_in(2), ..Material::default() }];
+    let vertices = 4 + random.below(9);
+    let mut mesh = Mesh::default();
+    mesh.positions = (0..vertices).map(|_| (random.point(2.0) * 4.0).round().as_vec3() / 4.0).collect();
+    let corner = |random: &mut Random| random.below(vertices);
+    mesh.triangles = (0..6 + random.below(60)).map(|_| [(); 3].map(|()| corner(random))).collect();
+    mesh.primitives = vec![Primitive { triangles: 0..mesh.triangles.len() as u32, material: Some(0) }];
+    scene.meshes.push(mesh);
+    scene.groups[0].push(Node { content: Content::Mesh(0), ..Node::default() });
+    (scene, some_view(random, 70, 9.0))
+}
+
+#[test]
+fn no_pixel_holds_more_than_is_there_where_surfaces_are_no_manifolds() {
+    let (covered, shot) = attack_all(1200, tangle, 5, 21);
+    assert!(covered > 100_000 && shot > 500_000, "{covered} pixels, {shot} rays");
+}

@@ -91,3 +91,28 @@ fn what_is_hidden_while_others_draw_is_hidden_in_the_end() {
     }
     assert!(hidden_meanwhile > 500 && hidden_in_the_end > 500, "{hidden_meanwhile} {hidden_in_the_end}");
 }
+
+#[test]
+fn a_shared_buffer_is_emptied_and_looks_from_elsewhere() {
+    for seed in 0..60 {
+        let scene = trouble::scene(seed);
+        let occluders: Vec<Occluder> =
+            scene.meshes.iter().map(|m| Occluder::of_mesh(m, &scene.materials)).collect();
+        let sized = |seed, width, height| View { width, height, ..trouble::view(seed) };
+        let views = [sized(seed, 70, 150), sized(seed + 1, 70, 150), sized(seed + 2, 150, 70)];
+        let mut shared = SharedBuffer::new(&views[0], &OcclusionOptions::default(), 3).unwrap();
+        for (k, view) in views.iter().enumerate() {
+            if k > 0 {
+                shared.look(view).unwrap();
+            }
+            assert!(shared.depths().iter().all(|&d| d == 0.0), "seed {seed}");
+            for i in scene.instances() {
+                shared.draw(&occluders[i.mesh as usize], &i.world_from_mesh);
+            }
+            let alone = drawn(&scene, view, &OcclusionOptions::default());
+            assert!(shared.depths() == alone.depths(), "seed {seed}, view {k}");
+        }
+        shared.clear();
+        assert!(shared.depths().iter().all(|&d| d == 0.0), "seed {seed}");
+    }
+}

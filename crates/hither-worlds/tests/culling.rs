@@ -1,0 +1,148 @@
+//! Nothing that shows is called hidden, on every world: what is nearest at some sample of a picture three times as
+//! fine each way is found by scene culling, whatever its options, and by an occlusion buffer that was asked about the
+//! boxes, the balls around and the meshes of all instances.
+
+use glam::DVec3;
+use hither::conventions::{Projection, View};
+use hither::cull::{
+    Ball, Boxes, CullOptions, Culler, Meaning, Occludee, Occluder, OcclusionBuffer, OcclusionOptions,
+    PlacedMesh, Verdict,
+};
+use hither::geometry::Aabb;
+use hither::reference::trouble::Random;
+use hither::scene::{Instance, Scene};
+use hither::{IndexOptions, RenderOptions, SceneIndex, render};
+use std::collections::HashSet;
+
+/// Every world, small.
+const SPECS: &[&str] = &[
+    "office?n=3",
+    "boxcity",
+    "clutter?parts=1",
+    "spheres?parts=1",
+    "hills?polygons=1000000",
+    "lecture",
+    "toothpicks?n=400",
+    "canyon?grid=7",
+    "soda",
+    "city",
+    "tetra",
+];
+
+#[test]
+fn every_world_is_looked_at() {
+    let looked_at: Vec<&str> = SPECS.iter().filter_map(|spec| spec.split('?').next()).collect();
+    let worlds: Vec<&str> = hither_worlds::list().iter().map(|info| info.name).collect();
+    assert_eq!(looked_at, worlds);
+}
+
+/// The views of all cameras, and two from random points near instances.
+fn views(scene: &Scene, random: &mut Random) -> Vec<View> {
+    let size = |random: &mut Random| (80 + random.below(120), 60 + random.below(90));
+    let mut views: Vec<View> =
+        (0..scene.cameras.len()).filter_map(|camera| scene.view(camera, size(random))).collect();
+    let instances = scene.instances();
+    for orthographic in [false, true] {
+        let place = |random: &mut Random| {
+            let instance = &instances[random.below(instances.len() as u32) as usize];
+            let mesh = &scene.meshes[instance.mesh as usize];
+            let vertex = mesh.positions[random.below(mesh.positions.len() as u32) as usize];
+            instance.world_from_mesh.transform_point3(vertex.as_dvec3())
+        };
+        let (eye, target) = (place(random) + random.point(0.3), place(random));
+        let projection = match orthographic {
+            true => {
+                Projection::Orthographic { half_height: random.between(0.5, 20.0), near: -1.0, far: 200.0 }
+            }
+            false => Projection::Perspective { fov_y: random.between(0.5, 2.0), near: 0.05 },
+        };
+        views.push(View::look_at(eye, target + DVec3::Z * 1e-3, DVec3::Y, projection, size(random)));
+    }
+    views
+}
+
+/// The instances nearest at the samples of a picture `times` as fine each way.
+fn seen(index: &SceneIndex, view: &View, times: u32) -> HashSet<u32> {
+    let fine = View { width: view.width * times, height: view.height * times, ..*view };
+    let frame = render(index, &fine, &RenderOptions::default()).unwrap();
+    let pixels = (0..fine.height).flat_map(|y| (0..fine.width).map(move |x| (x, y)));
+    pixels.filter_map(|(x, y)| frame.id(x, y)).map(|id| id.instance).collect()
+}
+
+#[test]
+fn scene_culling_leaves_out_nothing_that_shows() {
+    let mut left_out = 0;
+    for (number, spec) in SPECS.iter().enumerate() {
+        let index = SceneIndex::build(hither_worlds::generate(spec).unwrap(), &IndexOptions::default());
+        let random = &mut Random::new(number as u64);
+        let mut culler = Culler::new();
+        for view in views(index.scene(), random) {
+            let (samples, centres) = (seen(&index, &view, 3), seen(&index, &view, 1));
+            let usual = CullOptions::default();
+            let ways = [
+                usual,
+                CullOptions { coherence: true, ..usual },
+                CullOptions { coherence: true, least_occluder_px: 0, least_piece_px: 0, ..usual },
+                CullOptions { coarseness: 1 + random.below(5), least_occluder_px: 0, ..usual },
+                CullOptions { meaning: Meaning::Sampled, least_occluder_px: 0, ..usual },
+            ];
+            for options in ways {
+                let found = culler.cull(&index, &view, &options).unwrap();
+                let visible: HashSet<u32> = found.visible.iter().copied().collect();
+                let shown = if options.meaning == Meaning::Sampled { &centres } else { &samples };
+                let missing: Vec<_> = shown.difference(&visible).collect();
+                assert!(missing.is_empty(), "{spec}, {view:?}, {options:?}: {missing:?} are missing");
+                left_out += index.scene().instance_count() as usize - visible.len();
+            }
+        }
+    }
+    assert!(left_out > 5000, "{left_out} left out");
+}
+
+#[test]
+fn an_occlusion_buffer_hides_nothing_that_shows() {
+    let mut hidden = [0; 3];
+    for (number, spec) in SPECS.iter().enumerate() {
+        let index = SceneIndex::build(hither_worlds::generate(spec).unwrap(), &IndexOptions::default());
+        let scene = index.scene();
+        let instances = scene.instances();
+        let occluders: Vec<Occluder> =
+            scene.meshes.iter().map(|mesh| Occluder::of_mesh(mesh, &scene.materials)).collect();
+        let occludees: Vec<Occludee> =
+            scene.meshes.iter().map(|mesh| Occludee::of_mesh(mesh).unwrap()).collect();
+        let random = &mut Random::new(number as u64 + 100);
+        for view in views(scene, random) {
+            let seen = seen(&index, &view, 3);
+            let mut buffer = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
+            for instance in &instances {
+                buffer.draw(&occluders[instance.mesh as usize], &instance.world_from_mesh);
+            }
+            let around = |i: &Instance| {
+                let points = scene.meshes[i.mesh as usize].positions.iter();
+                Aabb::around(points.map(|p| i.world_from_mesh.transform_point3(p.as_dvec3())))
+            };
+            let bounds: Vec<Aabb> = instances.iter().map(around).collect();
+            let balls: Vec<Ball> = bounds
+                .iter()
+                .map(|b| Ball { center: b.center(), radius: b.size().length() * 0.500_001 })
+                .collect();
+            let placed = |i: &Instance| PlacedMesh {
+                mesh: &occludees[i.mesh as usize],
+                world_from_object: i.world_from_mesh,
+            };
+            let meshes: Vec<PlacedMesh> = instances.iter().map(placed).collect();
+            let mut verdicts = [const { Vec::new() }; 3];
+            buffer.ask(&bounds.iter().copied().collect::<Boxes>(), &mut verdicts[0]);
+            buffer.ask_balls(&balls, &mut verdicts[1]);
+            buffer.ask_meshes(&meshes, &mut verdicts[2]);
+            for (kind, verdicts) in verdicts.iter().enumerate() {
+                for &i in &seen {
+                    let verdict = verdicts[i as usize];
+                    assert_eq!(verdict, Verdict::Visible, "{spec}, {view:?}: {i} shows; asked as {kind}");
+                }
+                hidden[kind] += verdicts.iter().filter(|v| **v == Verdict::Hidden).count();
+            }
+        }
+    }
+    assert!(hidden.iter().all(|&h| h > 1000), "{hidden:?} hidden");
+}
