@@ -61,6 +61,7 @@ impl Eye {
             }
             Eye::Camera { index: 0, fov_y }
         } else {
+            check_can_be_framed(scene.bounds(), source)?;
             let view = framing(scene.bounds(), fov_y.unwrap_or(DEFAULT_FOV.to_radians()), options.size);
             let eye = numbers::point(view.eye_in_world());
             verbosity.note(&format!("note: the scene has no camera; all of it is seen from {eye}"));
@@ -122,6 +123,16 @@ fn unknown_camera(scene: &Scene, source: &str, name: &str) -> Failure {
     Failure::work(format!("{source}: no camera \"{name}\"; {remedy}"))
 }
 
+/// Refuses a scene whose squared size f64 cannot hold.
+fn check_can_be_framed(bounds: Option<Aabb>, source: &str) -> Result<(), Failure> {
+    let size = bounds.map_or(0.0, |b| b.size().max_element());
+    if size == 0.0 || (1e-100..=1e100).contains(&size) {
+        return Ok(());
+    }
+    let what = format!("it is {size:e} metres large, and only 1e-100 to 1e100 can be looked at as a whole");
+    Err(Failure::work(format!("{source}: {what}; scale it, or give it a camera")))
+}
+
 /// A near plane that cuts nothing off that one could wish to see. Depth is a floating-point quotient, so a
 /// plane very near costs no precision.
 fn near_plane(bounds: Option<Aabb>, distance: f64) -> f64 {
@@ -158,6 +169,19 @@ fn framing(bounds: Option<Aabb>, fov_y: f64, size: (u32, u32)) -> View {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_too_large_or_too_small_to_be_framed_is_refused() {
+        let of = |size: f64| Some(Aabb { min: DVec3::ZERO, max: DVec3::new(size, size, 0.0) });
+        for size in [0.0, 1e-99, 1.0, 1e99] {
+            assert!(check_can_be_framed(of(size), "a.glb").is_ok(), "{size}");
+        }
+        for size in [1e-300, 1e200, f64::INFINITY] {
+            let text = check_can_be_framed(of(size), "a.glb").unwrap_err().line;
+            assert!(text.starts_with("a.glb: it is ") && text.contains("scale it"), "{text}");
+        }
+        assert!(check_can_be_framed(None, "a.glb").is_ok());
+    }
 
     #[test]
     fn a_framed_box_fills_the_picture_without_being_cut() {

@@ -174,10 +174,8 @@ impl GroupIndex {
             record_places(&self.moving, &mut self.places, true);
             motion.refit = Refit::new(&self.moving);
             // They have slots to come back to.
-            let off = motion.movers.iter().filter(|&&i| is_off(i)).map(|&i| {
-                let place = self.places[i as usize];
-                (place.node, place.slot, Box3::EMPTY, i)
-            });
+            let off = motion.movers.iter().filter(|&&i| is_off(i)).map(|&i| (self.places[i as usize], i));
+            let off = off.map(|(place, i)| (place.node, place.slot, Box3::EMPTY, i));
             motion.refit.set(&mut self.moving, off);
         }
         moved.len()

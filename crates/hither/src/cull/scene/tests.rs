@@ -55,9 +55,8 @@ fn far_away(seed: u64, away: f64) -> (Scene, View) {
     let mut random = trouble::Random::new(seed + 31);
     let (mut scene, mut view) = (trouble::scene(seed), trouble::view(seed));
     let offset = DAffine3::from_translation(random.point(1.0).normalize_or(DVec3::X) * away);
-    let mut cube = Mesh::default();
-    cube.positions =
-        (0..8u32).map(|k| Vec3::from_array([0, 1, 2].map(|axis| (k >> axis & 1) as f32 - 0.5))).collect();
+    let corner = |k: u32| Vec3::from_array([0, 1, 2].map(|axis| (k >> axis & 1) as f32 - 0.5));
+    let mut cube = Mesh { positions: (0..8).map(corner).collect(), ..Mesh::default() };
     let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     cube.triangles = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
     cube.primitives.push(Primitive { triangles: 0..12, material: None });
@@ -81,7 +80,7 @@ fn far_away(seed: u64, away: f64) -> (Scene, View) {
     for node in nodes.iter_mut().filter(|n| n.parent.is_none()) {
         node.local = Transform::Affine(offset * node.local.matrix());
     }
-    view.view_from_world = view.view_from_world * offset.inverse();
+    view.view_from_world *= offset.inverse();
     (scene, view)
 }
 

@@ -100,7 +100,7 @@ fn nothing_drawn_hides_nothing_wherever_the_eye_is() {
 /// rounds.
 fn moved_away(scene: &mut Scene, view: &mut View, offset: DVec3, in_meshes: bool) {
     let away = DAffine3::from_translation(offset);
-    view.view_from_world = view.view_from_world * away.inverse();
+    view.view_from_world *= away.inverse();
     let root = scene.root as usize;
     if in_meshes {
         // Each instance becomes a mesh of its own.
@@ -152,8 +152,8 @@ fn tangle(seed: u64) -> (Scene, View) {
     let mut scene = Scene::new("tangle");
     scene.materials = vec![Material { double_sided: random.one_in(2), ..Material::default() }];
     let vertices = 4 + random.below(9);
-    let mut mesh = Mesh::default();
-    mesh.positions = (0..vertices).map(|_| (random.point(2.0) * 4.0).round().as_vec3() / 4.0).collect();
+    let points = (0..vertices).map(|_| (random.point(2.0) * 4.0).round().as_vec3() / 4.0);
+    let mut mesh = Mesh { positions: points.collect(), ..Mesh::default() };
     let corner = |random: &mut Random| random.below(vertices);
     mesh.triangles = (0..6 + random.below(60)).map(|_| [(); 3].map(|()| corner(random))).collect();
     mesh.primitives = vec![Primitive { triangles: 0..mesh.triangles.len() as u32, material: Some(0) }];
