@@ -123,21 +123,26 @@ impl SceneIndex {
     /// channels, the nodes below those that they move, and the boxes above; the first time, all nodes of the
     /// root group.
     pub fn pose(&mut self, animation: usize, time: f64) -> usize {
-        if !self.scene.pose(animation, time) {
-            return 0;
-        }
-        let mut changed: Vec<u32> =
-            self.scene.animations[animation].channels.iter().map(|channel| channel.node).collect();
+        let Some(channels) = self.scene.animations.get(animation).map(|a| &a.channels) else { return 0 };
+        let mut changed: Vec<u32> = channels.iter().map(|channel| channel.node).collect();
         changed.retain(|&n| (n as usize) < self.scene.root_group().nodes.len());
         changed.sort_unstable();
         changed.dedup();
-        let nodes = &mut self.scene.groups[self.scene.root as usize].nodes;
-        for n in &changed {
-            if let Some(stored) = self.switched_off.get_mut(n) {
-                *stored = std::mem::replace(&mut nodes[*n as usize].local, OFF);
+        // What is off is posed where it would be.
+        self.exchange(&changed);
+        self.scene.pose(animation, time);
+        self.exchange(&changed);
+        self.update(&changed)
+    }
+
+    /// Exchanges the transforms of those of `nodes` that are switched off for those that they would have.
+    fn exchange(&mut self, nodes: &[u32]) {
+        let all = &mut self.scene.groups[self.scene.root as usize].nodes;
+        for node in nodes {
+            if let Some(stored) = self.switched_off.get_mut(node) {
+                std::mem::swap(stored, &mut all[*node as usize].local);
             }
         }
-        self.update(&changed)
     }
 
     /// Switches a node of the root group off, with what hangs from it, or on again, wherever it is then. What is off

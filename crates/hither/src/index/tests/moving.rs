@@ -85,15 +85,20 @@ proptest! {
     }
 }
 
+/// Five hundred things in a hall.
+fn hall() -> Scene {
+    let mut scene = Scene::new("hall");
+    scene.meshes.push(triangle());
+    for i in 0..500 {
+        scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(50.0)));
+    }
+    scene
+}
+
 #[test]
 fn what_rests_is_not_touched() {
     for tree in KINDS {
-        let mut scene = Scene::new("hall");
-        scene.meshes.push(triangle());
-        for i in 0..500 {
-            scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(50.0)));
-        }
-        let mut index = SceneIndex::build(scene, &IndexOptions { tree });
+        let mut index = SceneIndex::build(hall(), &IndexOptions { tree });
         assert_eq!(index.set_transform(7, Transform::from_translation(DVec3::X)), 1);
         let resting = format!("{:?}", index.groups[0].resting);
         for step in 0..100 {
@@ -109,12 +114,7 @@ fn what_rests_is_not_touched() {
 #[test]
 fn what_is_switched_off_costs_nothing_but_its_slot() {
     for tree in KINDS {
-        let mut scene = Scene::new("hall");
-        scene.meshes.push(triangle());
-        for i in 0..500 {
-            scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(50.0)));
-        }
-        let mut index = SceneIndex::build(scene, &IndexOptions { tree });
+        let mut index = SceneIndex::build(hall(), &IndexOptions { tree });
         assert_eq!(index.set_shown(7, false), 1);
         assert_eq!(index.set_shown(7, false), 0);
         assert_eq!(items_in(&index.groups[0].moving), []);
@@ -127,6 +127,12 @@ fn what_is_switched_off_costs_nothing_but_its_slot() {
         assert_eq!(items_in(&index.groups[0].moving), [7]);
         assert!(index.groups[0].bounds().max[0] > 80.0);
         assert_eq!(format!("{:?}", index.groups[0].resting), resting);
+        // Until nothing is left, and back.
+        let all = || 0..500;
+        assert_eq!(all().map(|node| index.set_shown(node, false)).sum::<usize>(), 500);
+        assert!(index.groups[0].bounds().is_empty());
+        assert_eq!(all().map(|node| index.set_shown(node, true)).sum::<usize>(), 500);
+        assert_eq!(items_in(&index.groups[0].moving).len(), 500);
     }
 }
 
@@ -176,6 +182,12 @@ fn a_pose_moves_what_its_channels_name_and_what_hangs_from_it() {
         assert_eq!(index.pose(0, 0.5), 0);
         assert_eq!(index.pose(0, 2.0), 2);
         assert_eq!(index.pose(1, 0.0), 0);
+        // What is off is posed, too, and is there when it is switched on again.
+        assert_eq!(index.set_shown(0, false), 2);
+        assert_eq!(index.pose(0, 0.5), 0);
+        assert_eq!(index.set_shown(0, true), 2);
+        let half_open = Transform::from_translation(DVec3::X * 0.5);
+        assert_eq!(index.scene().root_group().nodes[0].local, half_open);
         index.validate();
     }
 }
