@@ -82,6 +82,25 @@ impl ViewOptions {
         let view = View::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, self.size);
         view.validate().map_err(|e| Failure::work(e.to_string()))
     }
+
+    /// Refuses a picture that the machine, or the limit that this program was given, has no memory for: better now
+    /// than in the middle of it.
+    pub fn check_memory(&self, bytes_a_pixel: u64) -> Result<(), Failure> {
+        let (width, height) = self.size;
+        let bytes = u64::from(width) * u64::from(height) * bytes_a_pixel;
+        let mut room = Vec::<u8>::new();
+        let enough = usize::try_from(bytes).is_ok_and(|bytes| room.try_reserve_exact(bytes).is_ok());
+        // Room that nobody looks at need not be asked for.
+        std::hint::black_box(&room);
+        if enough {
+            return Ok(());
+        }
+        let gibibytes = bytes as f64 / f64::from(1 << 30);
+        Err(Failure::work(format!(
+            "a picture of {width}x{height} pixels needs {gibibytes:.1} GiB of memory, more than there is; \
+             choose a smaller --size"
+        )))
+    }
 }
 
 /// How the work is done. The picture does not depend on it.

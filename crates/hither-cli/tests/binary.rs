@@ -117,6 +117,23 @@ fn an_input_that_fails_is_code_1() {
     assert_eq!(folder.names(), ["noise.glb"]);
 }
 
+/// Under a limit of its own, which shells of Unix can set.
+#[cfg(unix)]
+#[test]
+fn a_picture_that_there_is_no_memory_for_is_refused() {
+    let folder = Folder::new("memory");
+    let command = format!(
+        "ulimit -v 2000000; exec '{}' render {WORLD} -o '{}' --size 16384x16384",
+        env!("CARGO_BIN_EXE_hither"),
+        folder.path("x.exr")
+    );
+    let output = Command::new("sh").args(["-c", &command]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let text = stderr(&output);
+    assert!(text.lines().count() == 1 && text.contains("16384x16384") && text.contains("GiB"), "{text}");
+    assert!(folder.names().is_empty());
+}
+
 #[test]
 fn an_output_that_cannot_be_written_is_refused_before_the_work() {
     let folder = Folder::new("output");

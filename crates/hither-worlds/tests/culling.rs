@@ -2,6 +2,9 @@
 //! fine each way is found by scene culling, whatever its options, and by an occlusion buffer that was asked about the
 //! boxes, the balls around and the meshes of all instances.
 
+mod common;
+
+use common::{assert_every_world_is_in, views_of_cameras};
 use glam::DVec3;
 use hither::conventions::{Projection, View};
 use hither::cull::{
@@ -31,16 +34,13 @@ const SPECS: &[&str] = &[
 
 #[test]
 fn every_world_is_looked_at() {
-    let looked_at: Vec<&str> = SPECS.iter().filter_map(|spec| spec.split('?').next()).collect();
-    let worlds: Vec<&str> = hither_worlds::list().iter().map(|info| info.name).collect();
-    assert_eq!(looked_at, worlds);
+    assert_every_world_is_in(SPECS);
 }
 
 /// The views of all cameras, and two from random points near instances.
 fn views(scene: &Scene, random: &mut Random) -> Vec<View> {
     let size = |random: &mut Random| (80 + random.below(120), 60 + random.below(90));
-    let mut views: Vec<View> =
-        (0..scene.cameras.len()).filter_map(|camera| scene.view(camera, size(random))).collect();
+    let mut views = views_of_cameras(scene, || size(random));
     let instances = scene.instances();
     for orthographic in [false, true] {
         let place = |random: &mut Random| {

@@ -3,6 +3,9 @@
 //! world's cameras at several moments, and from eyes that lean towards trouble: on a vertex, along an edge, a hair
 //! in front of a face.
 
+mod common;
+
+use common::{assert_every_world_is_in, views_of_cameras};
 use fearless_simd::Level;
 use glam::{DQuat, DVec3};
 use hither::conventions::{Projection, View};
@@ -37,16 +40,13 @@ fn world(spec: &str) -> Scene {
 
 #[test]
 fn every_world_is_looked_at() {
-    let looked_at: Vec<&str> = SPECS.iter().filter_map(|spec| spec.split('?').next()).collect();
-    let worlds: Vec<&str> = hither_worlds::list().iter().map(|info| info.name).collect();
-    assert_eq!(looked_at, worlds);
+    assert_every_world_is_in(SPECS);
 }
 
 /// The views of all cameras, as the scene is posed now, and some from eyes at a random triangle of it.
 fn views(scene: &Scene, random: &mut Random) -> Vec<View> {
     let size = |random: &mut Random| (160 + random.below(161), 120 + random.below(81));
-    let mut views: Vec<View> =
-        (0..scene.cameras.len()).filter_map(|camera| scene.view(camera, size(random))).collect();
+    let mut views = views_of_cameras(scene, || size(random));
     let projection = views[0].projection;
     let instances = scene.instances();
     for kind in 0..3 {

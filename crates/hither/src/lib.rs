@@ -7,6 +7,18 @@
 //! [`conventions`]; [`geometry`]; [`scene`], [`raster`]; [`index`]; [`order`], [`cull`]; [`render`](mod@render),
 //! [`hidden_line`], [`classic`]; [`layers`].
 //! [`reference`](mod@reference) is the brute-force truth that every fast answer is tested against.
+//!
+//! # In debug builds
+//!
+//! Vector code that is not optimised is many times slower, and keeps every vector that it made on the stack:
+//! up to 3 MiB, more than Rust gives a thread by itself. A program that depends on this crate wants in its `Cargo.toml`
+//!
+//! ```toml
+//! [profile.dev.package]
+//! hither.opt-level = 2
+//! fearless_simd.opt-level = 2
+//! glam.opt-level = 2
+//! ```
 #![forbid(unsafe_code)]
 
 pub mod classic;

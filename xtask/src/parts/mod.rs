@@ -2,12 +2,13 @@
 //! install; none is left out silently. The tests' own closing lines come last.
 
 mod embree;
+mod fuzz;
 mod readers;
 
 use crate::tidy;
 use anyhow::{Context, Result};
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
@@ -38,6 +39,7 @@ const PARTS: &[(&str, Part)] = &[
     ("tests", |job| job.cargo_test(&["--workspace", "--no-fail-fast"])),
     ("without vector instructions", |job| job.cargo_test(WITHOUT_VECTORS)),
     ("documentation", documentation),
+    ("fuzz targets", fuzz::run),
     ("files read by others", readers::run),
     ("Embree agrees", embree::run),
 ];
@@ -77,7 +79,18 @@ pub fn passed(well: bool) -> Outcome {
     if well { Outcome::Passed } else { Outcome::Failed }
 }
 
+/// Whether a command could be run and ended well; what it prints is of no interest.
+fn succeeds(command: &mut Command) -> bool {
+    command.output().is_ok_and(|output| output.status.success())
+}
+
 impl Job<'_> {
+    /// Where cargo puts what it builds.
+    fn target(&self) -> PathBuf {
+        let folder = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
+        self.root.join(Path::new(&folder))
+    }
+
     /// Runs `cargo test` with `arguments`, showing its output and keeping its closing lines.
     pub fn cargo_test(&mut self, arguments: &[&str]) -> Result<Outcome> {
         let mut child = Command::new(env!("CARGO"))

@@ -1,9 +1,9 @@
 //! Files that Hither writes, read by software that shares nothing with it: glTF by trimesh, EXR by the OpenEXR
 //! library, PNG by Pillow, all from PyPI into an environment of their own below `target/`.
 
-use super::{Job, Outcome, passed};
+use super::{Job, Outcome, passed, succeeds};
 use anyhow::Result;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
 const PACKAGES: &[&str] = &["trimesh", "numpy", "OpenEXR", "pillow"];
@@ -47,17 +47,5 @@ fn environment(job: &Job) -> Result<PathBuf, String> {
         Ok(python)
     } else {
         Err(format!("PyPI could not be reached for {}; connect to the network", PACKAGES.join(", ")))
-    }
-}
-
-fn succeeds(command: &mut Command) -> bool {
-    command.output().is_ok_and(|output| output.status.success())
-}
-
-impl Job<'_> {
-    /// Where cargo puts what it builds.
-    fn target(&self) -> PathBuf {
-        let folder = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
-        self.root.join(Path::new(&folder))
     }
 }

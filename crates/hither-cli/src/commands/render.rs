@@ -51,6 +51,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     outputs::check(arguments.output.as_deref(), arguments.view.frames.as_ref(), to)?;
 
     arguments.view.check_size()?;
+    // The depth buffer and the frame, and the picture with what its file holds of each pixel.
+    arguments.view.check_memory(if format == Some(PictureFormat::Exr) { 66 } else { 26 })?;
     let start = Instant::now();
     let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
     let read_time = start.elapsed();

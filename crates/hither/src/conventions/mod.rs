@@ -123,6 +123,38 @@ impl View {
         }
     }
 
+    /// A view that shows all that an off-axis picture of one eye does, to cull with: a headset's eye, a tile of a wall
+    /// of screens, a picture moved by parts of a pixel from frame to frame.
+    ///
+    /// `tangents` are those of the angles from the axis to the picture's left, right, lower and upper border, as
+    /// x/distance and y/distance: left below right, lower below upper; a picture all on one side of the axis has two of a
+    /// sign. `height` is the picture's, pixels. The view has the same eye, axis, near plane and size of pixels, borders as
+    /// far from the axis on both sides as the farther one, and half a pixel or more to spare. What it calls hidden is
+    /// hidden in the picture, for that depends on the eye alone; what it calls outside is outside. A picture around its
+    /// axis costs nothing more, one that ends at it twice the pixels.
+    pub fn around_off_axis(
+        view_from_world: DAffine3,
+        tangents: [f64; 4],
+        near: f64,
+        height: u32,
+    ) -> Result<View, ViewError> {
+        let [left, right, lower, upper] = tangents;
+        if !(tangents.iter().all(|t| t.is_finite()) && left < right && lower < upper && height > 0) {
+            return Err(ViewError::Camera(
+                "its borders must be finite, the left below the right, the lower below the upper",
+            ));
+        }
+        let pixel = (upper - lower) / f64::from(height);
+        // A whole number of pixels on both sides of the axis; saturating, for `validate` to refuse.
+        let half = |a: f64, b: f64| (a.abs().max(b.abs()) / pixel + 0.5).ceil();
+        let (half_width, half_height) = (half(left, right), half(lower, upper));
+        let fov_y = 2.0 * (half_height * pixel).atan();
+        let projection = Projection::Perspective { fov_y, near };
+        let (width, height) = ((half_width * 2.0) as u32, (half_height * 2.0) as u32);
+        let view = View { view_from_world, projection, width, height };
+        view.validate().map(|()| view)
+    }
+
     /// The eye in world space (for an orthographic view, a point on its axis at distance 0).
     pub fn eye_in_world(&self) -> DVec3 {
         self.view_from_world.inverse().translation
@@ -197,6 +229,38 @@ mod tests {
         let projection = Projection::Perspective { fov_y: 1.0, near: 0.1 };
         let view_from_world = DAffine3 { matrix3, translation: DVec3::new(1.0, -2.0, 3.0) };
         View { view_from_world, projection, width: 64, height: 48 }
+    }
+
+    #[test]
+    fn a_view_around_an_off_axis_picture_shows_all_of_it() {
+        let pose = scaled(DVec3::ONE).view_from_world;
+        let pictures = [
+            ([-1.0, 1.0, -0.5, 0.5], 500),
+            ([-1.37, 0.92, -1.1, 1.2], 1833),
+            ([0.2, 0.9, -0.3, 0.001], 90),
+            ([-3.0, -2.9, 1.0, 1.1], 100),
+            ([-1e-3, 1.0, -1.0, 1e-3], 16),
+        ];
+        for (tangents, height) in pictures {
+            let view = View::around_off_axis(pose, tangents, 0.1, height).unwrap();
+            let pixel = (tangents[3] - tangents[2]) / f64::from(height);
+            assert!(
+                (view.pixels_per_unit() * pixel - 1.0).abs() < 1e-12,
+                "{tangents:?}: pixels of another size"
+            );
+            let reach = |size: u32| f64::from(size) * 0.5 * pixel;
+            let farthest = [(view.width, 0), (view.height, 2)]
+                .map(|(size, k)| (reach(size), tangents[k].abs().max(tangents[k + 1].abs())));
+            for (reach, farthest) in farthest {
+                assert!((0.499..1.6).contains(&((reach - farthest) / pixel)), "{tangents:?}");
+            }
+        }
+        let refused = |tangents, near, height| View::around_off_axis(pose, tangents, near, height).is_err();
+        assert!(refused([1.0, -1.0, -1.0, 1.0], 0.1, 100) && refused([-1.0, f64::NAN, -1.0, 1.0], 0.1, 100));
+        assert!(refused([-1.0, 1.0, -1.0, 1.0], 0.0, 100) && refused([-1.0, 1.0, -1.0, 1.0], 0.1, 0));
+        assert!(
+            refused([-1.0, 1.0, 5e3, 5e3 + 1.0], 0.1, 1000) && refused([-1e300, 1e300, -1.0, 1.0], 0.1, 9)
+        );
     }
 
     #[test]

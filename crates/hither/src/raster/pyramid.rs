@@ -283,6 +283,43 @@ impl Target {
         }
     }
 
+    /// Takes over what another window of the same size shows where it is nearer; its instances' numbers grow by
+    /// `first`. At equal depth this window's surface stays.
+    pub(crate) fn merge(&mut self, other: &Target, first: u32) {
+        assert!(self.width == other.width && self.height == other.height, "windows of different sizes");
+        let slot = self.surfaces.len() as u32;
+        let moved = |s: &SurfaceId| SurfaceId { instance: s.instance + first, ..*s };
+        self.surfaces.extend(other.surfaces.iter().map(moved));
+        for tile in (0..self.touched.len()).filter(|&tile| other.touched[tile]) {
+            self.touch(tile);
+            let mut rises = false;
+            for block in tile * 16..tile * 16 + 16 {
+                let (ours, theirs) = (&mut self.depth[block].0, &other.depth[block].0);
+                if ours.iter().zip(theirs).all(|(ours, theirs)| ours >= theirs) {
+                    continue;
+                }
+                let shared = std::mem::replace(&mut self.block_id[block], MIXED);
+                if shared != MIXED {
+                    self.id[block] = Sixteen([shared; 16]);
+                }
+                for p in 0..16 {
+                    if ours[p] >= theirs[p] {
+                        continue;
+                    }
+                    let shared = other.block_id[block];
+                    let id = if shared == MIXED { other.id[block].0[p] } else { shared };
+                    ours[p] = theirs[p];
+                    self.id[block].0[p] = id + slot;
+                }
+                let least = self.depth[block].0.into_iter().fold(f32::INFINITY, f32::min);
+                rises |= self.raise_block_minimum(tile, block % 16, least);
+            }
+            if rises {
+                self.mark_stale(tile);
+            }
+        }
+    }
+
     /// Starts or stops counting visits a pixel.
     pub(crate) fn record_visits(&mut self, on: bool) {
         let pixels = (self.width * self.height) as usize;

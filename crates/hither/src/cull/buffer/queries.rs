@@ -3,7 +3,7 @@
 use super::ask::{BoxView, BoxesOnScreen, project};
 use super::draw::Band;
 use super::{Frame, Occludee, OcclusionBuffer, PlacedMesh, Verdict};
-use crate::conventions::Projection;
+use crate::conventions::{Projection, View};
 use crate::cull::Meaning;
 use crate::geometry::Aabb;
 use crate::index::Box3;
@@ -106,6 +106,57 @@ pub struct Ball {
     pub center: DVec3,
     /// Its radius, metres.
     pub radius: f64,
+}
+
+impl Ball {
+    /// The rectangle around it on the screen and the nearest it comes; what is to be said of it where it has none.
+    pub(super) fn on_screen(&self, view: &View) -> Result<ScreenRect, Verdict> {
+        let c = view.view_from_world.transform_point3(self.center);
+        let size = c.abs().max_element() + self.center.abs().max_element();
+        // Rounding of the transform, and of what follows.
+        let radius = self.radius.abs() + size * 1e-12;
+        if !(c.is_finite() && radius.is_finite()) {
+            return Err(Verdict::Visible);
+        }
+        let scale = view.pixels_per_unit();
+        let (x, y, depth) = match view.projection {
+            Projection::Perspective { near, .. } => {
+                let distance = -c.z;
+                if distance + radius < near {
+                    return Err(Verdict::Outside);
+                }
+                if distance - radius <= near {
+                    return Err(Verdict::Visible);
+                }
+                // Tangents from the eye to the circle in which the axis' plane through the eye cuts the ball.
+                let tangents = |a: f64| {
+                    let away = (a * a + distance * distance - radius * radius).sqrt() * radius;
+                    let below = distance * distance - radius * radius;
+                    [(a * distance - away) / below * scale, (a * distance + away) / below * scale]
+                };
+                (tangents(c.x), tangents(-c.y), near / (distance - radius))
+            }
+            Projection::Orthographic { near, far, .. } => {
+                let depth = (far + c.z + radius) / (far - near);
+                let tangents = |a: f64| [(a - radius) * scale, (a + radius) * scale];
+                if depth > 1.0 {
+                    let wholly = (far + c.z - radius) / (far - near) > 1.0;
+                    return Err(if wholly { Verdict::Outside } else { Verdict::Visible });
+                }
+                (tangents(c.x), tangents(-c.y), depth)
+            }
+        };
+        let (w, h) = (f64::from(view.width) * 0.5, f64::from(view.height) * 0.5);
+        let slack = 1e-6 + 1e-9 * (x[0].abs() + x[1].abs() + y[0].abs() + y[1].abs());
+        let depth = (depth * (1.0 + 1e-9)) as f32;
+        Ok(ScreenRect {
+            left: x[0] + w - slack,
+            top: y[0] + h - slack,
+            right: x[1] + w + slack,
+            bottom: y[1] + h + slack,
+            depth: depth.next_up(),
+        })
+    }
 }
 
 impl OcclusionBuffer {
@@ -262,54 +313,11 @@ impl Frame {
     }
 
     pub(super) fn ask_sphere(&self, bands: &[&Band], center: DVec3, radius: f64) -> Verdict {
-        let c = self.view.view_from_world.transform_point3(center);
-        let size = c.abs().max_element() + center.abs().max_element();
-        // Rounding of the transform, and of what follows.
-        let radius = radius.abs() + self.options.objects_move * 2.0 + size * 1e-12;
-        if !(c.is_finite() && radius.is_finite()) {
-            return Verdict::Visible;
+        let ball = Ball { center, radius: radius.abs() + self.options.objects_move * 2.0 };
+        match ball.on_screen(&self.view) {
+            Ok(rect) => self.ask_rect(bands, &rect),
+            Err(verdict) => verdict,
         }
-        let scale = self.view.pixels_per_unit();
-        let (x, y, depth) = match self.view.projection {
-            Projection::Perspective { near, .. } => {
-                let distance = -c.z;
-                if distance + radius < near {
-                    return Verdict::Outside;
-                }
-                if distance - radius <= near {
-                    return Verdict::Visible;
-                }
-                // Tangents from the eye to the circle in which the axis' plane through the eye cuts the ball.
-                let tangents = |a: f64| {
-                    let away = (a * a + distance * distance - radius * radius).sqrt() * radius;
-                    let below = distance * distance - radius * radius;
-                    [(a * distance - away) / below * scale, (a * distance + away) / below * scale]
-                };
-                (tangents(c.x), tangents(-c.y), near / (distance - radius))
-            }
-            Projection::Orthographic { near, far, .. } => {
-                let depth = (far + c.z + radius) / (far - near);
-                let tangents = |a: f64| [(a - radius) * scale, (a + radius) * scale];
-                if depth > 1.0 {
-                    let wholly = (far + c.z - radius) / (far - near) > 1.0;
-                    return if wholly { Verdict::Outside } else { Verdict::Visible };
-                }
-                (tangents(c.x), tangents(-c.y), depth)
-            }
-        };
-        let (w, h) = (f64::from(self.view.width) * 0.5, f64::from(self.view.height) * 0.5);
-        let slack = 1e-6 + 1e-9 * (x[0].abs() + x[1].abs() + y[0].abs() + y[1].abs());
-        let depth = (depth * (1.0 + 1e-9)) as f32;
-        self.ask_rect(
-            bands,
-            &ScreenRect {
-                left: x[0] + w - slack,
-                top: y[0] + h - slack,
-                right: x[1] + w + slack,
-                bottom: y[1] + h + slack,
-                depth: depth.next_up(),
-            },
-        )
     }
 
     pub(super) fn ask_rect(&self, bands: &[&Band], rect: &ScreenRect) -> Verdict {

@@ -249,7 +249,7 @@ impl Culler {
     }
 
     /// Which instances may be seen in each of several views: the cascades of a shadow, the faces of a cube, two
-    /// eyes. They are culled at once, on as many threads as rayon has.
+    /// eyes ([`View::around_off_axis`] for those of a headset). They are culled at once, on as many threads as rayon has.
     pub fn cull_views(
         &mut self,
         index: &SceneIndex,

@@ -3,6 +3,7 @@
 use super::*;
 use crate::conventions::Projection;
 use crate::cull::planes::{PlaneCuller, PlanesOptions};
+use crate::geometry::Aabb;
 use crate::index::IndexOptions;
 use crate::reference::trouble;
 use crate::reference::zbuffer;
@@ -50,17 +51,22 @@ fn what_shows_is_never_left_out() {
     assert!(left_out > 100, "{left_out} of {total} left out");
 }
 
-/// A scene and its view so far from the origin; and long needles, sheets and blocks around the eye.
-fn far_away(seed: u64, away: f64) -> (Scene, View) {
-    let mut random = trouble::Random::new(seed + 31);
-    let (mut scene, mut view) = (trouble::scene(seed), trouble::view(seed));
-    let offset = DAffine3::from_translation(random.point(1.0).normalize_or(DVec3::X) * away);
+/// A cube of edge 1 around the origin.
+fn unit_cube() -> Mesh {
     let corner = |k: u32| Vec3::from_array([0, 1, 2].map(|axis| (k >> axis & 1) as f32 - 0.5));
     let mut cube = Mesh { positions: (0..8).map(corner).collect(), ..Mesh::default() };
     let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     cube.triangles = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
     cube.primitives.push(Primitive { triangles: 0..12, material: None });
-    scene.meshes.push(cube);
+    cube
+}
+
+/// A scene and its view so far from the origin; and long needles, sheets and blocks around the eye.
+fn far_away(seed: u64, away: f64) -> (Scene, View) {
+    let mut random = trouble::Random::new(seed + 31);
+    let (mut scene, mut view) = (trouble::scene(seed), trouble::view(seed));
+    let offset = DAffine3::from_translation(random.point(1.0).normalize_or(DVec3::X) * away);
+    scene.meshes.push(unit_cube());
     let mesh = scene.meshes.len() as u32 - 1;
     let eye = view.eye_in_world();
     let root = scene.root as usize;
@@ -371,4 +377,49 @@ fn within_the_margin_a_moved_eye_sees_nothing_that_was_left_out() {
         }
     }
     assert!(left_out > 20, "{left_out}");
+}
+
+/// How near a box comes to the eye, as depth: what reaches the near plane is as near as can be.
+fn nearest_depth(view: &View, b: &Aabb) -> f64 {
+    let corners =
+        (0..8).map(|k| DVec3::select(glam::BVec3::new(k & 1 > 0, k & 2 > 0, k & 4 > 0), b.max, b.min));
+    let along = corners.map(|p| -view.view_from_world.transform_point3(p).z);
+    let distance = along.fold(f64::INFINITY, f64::min);
+    match view.projection {
+        Projection::Perspective { near, .. } => near / distance.max(near),
+        Projection::Orthographic { near, far, .. } => (far - distance.max(near)) / (far - near),
+    }
+}
+
+#[test]
+fn what_may_be_seen_comes_nearest_first() {
+    let mut culler = Culler::new();
+    let mut pairs = 0;
+    for seed in 0..60 {
+        let mut random = trouble::Random::new(seed + 700);
+        let mut scene = Scene::new("boxes");
+        scene.meshes.push(unit_cube());
+        for _ in 0..200 {
+            let size = DVec3::from_array([(); 3].map(|()| random.between(0.05, 1.5)));
+            let at = DAffine3::from_translation(random.point(20.0)) * DAffine3::from_scale(size);
+            let local = Transform::Affine(at);
+            scene.groups[0].push(Node { content: Content::Mesh(0), local, ..Node::default() });
+        }
+        let index = SceneIndex::build(scene, &IndexOptions::default());
+        let unit = Aabb { min: DVec3::splat(-0.5), max: DVec3::splat(0.5) };
+        let instances = index.scene().instances();
+        let view = trouble::view(seed);
+        for coherence in [false, true, true] {
+            let found =
+                culler.cull(&index, &view, &CullOptions { coherence, ..CullOptions::default() }).unwrap();
+            let depth =
+                |&i: &u32| nearest_depth(&view, &unit.transformed(&instances[i as usize].world_from_mesh));
+            let depths: Vec<f64> = found.visible.iter().map(depth).collect();
+            for pair in depths.windows(2) {
+                pairs += 1;
+                assert!(pair[0] >= pair[1] * (1.0 - 1e-5) - 1e-5, "seed {seed}: {pair:?} of {depths:?}");
+            }
+        }
+    }
+    assert!(pairs > 3000, "{pairs}");
 }

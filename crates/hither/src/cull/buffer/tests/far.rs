@@ -73,6 +73,8 @@ fn nothing_drawn_hides_nothing_wherever_the_eye_is() {
             let buffer = OcclusionBuffer::new(&view, &options).unwrap();
             let bounds: Vec<Aabb> = (0..160).map(|_| near_the_eye(random, &view)).collect();
             let mut verdicts = Vec::new();
+            SampledBuffer::new(&view).unwrap().ask(&bounds.iter().copied().collect(), &mut verdicts);
+            assert!(!verdicts.contains(&Verdict::Hidden), "{away} m away, samples");
             buffer.ask(&bounds.iter().copied().collect(), &mut verdicts);
             for (b, verdict) in bounds.iter().zip(verdicts) {
                 assert_ne!(
