@@ -16,16 +16,17 @@ use proptest::prelude::*;
 /// Every instruction set this machine has; with the feature `portable`, code without any too.
 fn levels() -> Vec<Level> {
     let best = Level::new();
-    let mut levels = vec![best];
-    #[cfg(feature = "portable")]
-    levels.push(Level::fallback());
-    #[cfg(target_arch = "x86_64")]
-    {
-        levels.extend(best.as_avx2().map(Level::Avx2));
-        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
-        levels.extend(best.as_sse2().map(Level::Sse2));
-    }
-    levels
+    let others: [Option<Level>; _] = [
+        #[cfg(feature = "portable")]
+        Some(Level::fallback()),
+        #[cfg(target_arch = "x86_64")]
+        best.as_avx2().map(Level::Avx2),
+        #[cfg(target_arch = "x86_64")]
+        best.as_sse4_2().map(Level::Sse4_2),
+        #[cfg(target_arch = "x86_64")]
+        best.as_sse2().map(Level::Sse2),
+    ];
+    std::iter::once(best).chain(others.into_iter().flatten()).collect()
 }
 
 fn plain(level: Level) -> RenderOptions {

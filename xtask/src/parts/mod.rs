@@ -3,6 +3,7 @@
 
 mod embree;
 mod fuzz;
+mod neon;
 mod readers;
 
 use crate::tidy;
@@ -38,6 +39,7 @@ const PARTS: &[(&str, Part)] = &[
     ("tidy", |job| Ok(passed(tidy::run(job.root, false)?))),
     ("tests", |job| job.cargo_test(&["--workspace", "--no-fail-fast"])),
     ("without vector instructions", |job| job.cargo_test(WITHOUT_VECTORS)),
+    ("NEON", neon::run),
     ("documentation", documentation),
     ("fuzz targets", fuzz::run),
     ("files read by others", readers::run),
@@ -91,15 +93,17 @@ impl Job<'_> {
         self.root.join(Path::new(&folder))
     }
 
-    /// Runs `cargo test` with `arguments`, showing its output and keeping its closing lines.
+    /// Runs `cargo test` with `arguments`; see [`Job::run_tests`].
     pub fn cargo_test(&mut self, arguments: &[&str]) -> Result<Outcome> {
-        let mut child = Command::new(env!("CARGO"))
-            .arg("test")
-            .args(arguments)
-            .current_dir(self.root)
-            .stdout(Stdio::piped())
-            .spawn()
-            .context("cannot run cargo test")?;
+        let mut command = Command::new(env!("CARGO"));
+        command.arg("test").args(arguments);
+        self.run_tests(command)
+    }
+
+    /// Runs a `cargo test` in the workspace, showing its output and keeping its closing lines.
+    pub fn run_tests(&mut self, mut command: Command) -> Result<Outcome> {
+        let mut child =
+            command.current_dir(self.root).stdout(Stdio::piped()).spawn().context("cannot run cargo test")?;
         let stdout = child.stdout.take().context("cargo test has no output")?;
         for line in BufReader::new(stdout).lines() {
             let line = line?;
