@@ -111,7 +111,7 @@ fn samples_are_the_same_in_bands_of_threads_and_merged() {
         let view = View { width: 90, height: 130, ..trouble::view(seed + 40) };
         let (occluders, instances) = (occluders_of(&scene), scene.instances());
         let alone = drawn_sampled(&scene, &occluders, &view, 1);
-        let mut halves = [(); 2].map(|()| SampledBuffer::in_bands(&view, 3).unwrap());
+        let halves = [(); 2].map(|()| SampledBuffer::in_bands(&view, 3).unwrap());
         let (first, last) = instances.split_at(instances.len() / 2);
         for (half, instances) in halves.iter().zip([first, last]) {
             for i in instances {
