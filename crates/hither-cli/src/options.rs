@@ -83,8 +83,8 @@ impl ViewOptions {
         view.validate().map_err(|e| Failure::work(e.to_string()))
     }
 
-    /// Refuses a picture that the machine, or the limit that this program was given, has no memory for: better now
-    /// than in the middle of it.
+    /// Refuses a picture that the operating system would not give the memory for, so far as it says so beforehand:
+    /// better now than in the middle of it.
     pub fn check_memory(&self, bytes_a_pixel: u64) -> Result<(), Failure> {
         let (width, height) = self.size;
         let bytes = u64::from(width) * u64::from(height) * bytes_a_pixel;

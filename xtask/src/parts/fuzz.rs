@@ -2,7 +2,7 @@
 //! is started by hand (`fuzz/README.md`).
 
 use super::{Job, Outcome, succeeds};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -18,19 +18,29 @@ pub fn run(job: &mut Job) -> Result<Outcome> {
         ));
     }
     let fuzz = job.root.join("fuzz");
-    let built = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--bins", "--manifest-path"])
-        .arg(fuzz.join("Cargo.toml"))
-        .arg("--target-dir")
-        .arg(job.target().join("fuzz"))
-        .status()?;
+    let cargo = |command: &str| {
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.arg(command).arg("--manifest-path").arg(fuzz.join("Cargo.toml"));
+        cargo
+    };
+    if !succeeds(&mut cargo("fetch")) {
+        return Ok(Outcome::Skipped(
+            "crates.io could not be reached for libfuzzer-sys; connect to the network".into(),
+        ));
+    }
+    let target = job.target().join("fuzz");
+    let built = cargo("build").args(["--quiet", "--bins", "--target-dir"]).arg(&target).status()?;
     if !built.success() {
         return Ok(Outcome::Failed);
     }
     for seeds in files(&fuzz.join("seeds"))?.into_iter().filter(|path| path.is_dir()) {
         let name = seeds.file_name().context("a folder of seeds has a name")?;
         let seeds = files(&seeds)?;
-        let output = Command::new(job.target().join("fuzz/debug").join(name)).args(&seeds).output()?;
+        // Without any it would search, and not end.
+        ensure!(!seeds.is_empty(), "fuzz/seeds/{} is empty", name.display());
+        let program = target.join("debug").join(name);
+        let run = Command::new(&program).args(&seeds).output();
+        let output = run.with_context(|| format!("cannot run {}", program.display()))?;
         println!("{}: {} seeds", name.display(), seeds.len());
         if !output.status.success() {
             println!("{}", String::from_utf8_lossy(&output.stderr));

@@ -81,6 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     planes::check_map(arguments)?;
     outputs::check_report(to)?;
     arguments.view.check_size()?;
+    // The occlusion buffer: a depth, and its share of blocks and tiles.
     arguments.view.check_memory(6)?;
     let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
     if arguments.method == MethodName::Planes {

@@ -102,6 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.layers.check()?;
     check_outputs(arguments)?;
     arguments.view.check_size()?;
+    // A picture, and what draws and holds one layer.
     arguments.view.check_memory(32)?;
     let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
     let prepared = arguments.parts.prepare(&mut scene, &arguments.scene)?;

@@ -127,11 +127,14 @@ impl View {
     /// of screens, a picture moved by parts of a pixel from frame to frame.
     ///
     /// `tangents` are those of the angles from the axis to the picture's left, right, lower and upper border, as
-    /// x/distance and y/distance: left below right, lower below upper; a picture all on one side of the axis has two of a
-    /// sign. `height` is the picture's, pixels. The view has the same eye, axis, near plane and size of pixels, borders as
-    /// far from the axis on both sides as the farther one, and half a pixel or more to spare. What it calls hidden is
-    /// hidden in the picture, for that depends on the eye alone; what it calls outside is outside. A picture around its
-    /// axis costs nothing more, one that ends at it twice the pixels.
+    /// x/distance and y/distance: left below right, lower below upper; a picture all on one side of the axis has two of
+    /// a sign. `height` is the picture's, pixels. The view has the same eye, axis, near plane and size of pixels, its
+    /// borders are on both sides as far from the axis as the farther one, and it has half a pixel or more to spare.
+    ///
+    /// What it calls hidden is hidden in the picture, for that depends on the eye alone, and so is what it calls
+    /// outside; but not what is sampled: the picture's centres of pixels are others. A picture around its axis costs
+    /// nothing more, one that ends at it twice the pixels in that direction, one far beside it as many as lie
+    /// between. Refused where that is more than [`MAX_IMAGE_SIDE`].
     pub fn around_off_axis(
         view_from_world: DAffine3,
         tangents: [f64; 4],
@@ -139,10 +142,13 @@ impl View {
         height: u32,
     ) -> Result<View, ViewError> {
         let [left, right, lower, upper] = tangents;
-        if !(tangents.iter().all(|t| t.is_finite()) && left < right && lower < upper && height > 0) {
+        if !(tangents.iter().all(|t| t.is_finite()) && left < right && lower < upper) {
             return Err(ViewError::Camera(
                 "its borders must be finite, the left below the right, the lower below the upper",
             ));
+        }
+        if height == 0 {
+            return Err(ViewError::Size { width: 0, height });
         }
         let pixel = (upper - lower) / f64::from(height);
         // A whole number of pixels on both sides of the axis; saturating, for `validate` to refuse.
@@ -152,7 +158,25 @@ impl View {
         let projection = Projection::Perspective { fov_y, near };
         let (width, height) = ((half_width * 2.0) as u32, (half_height * 2.0) as u32);
         let view = View { view_from_world, projection, width, height };
-        view.validate().map(|()| view)
+        view.validate()?;
+        // So wide an angle that its f64 no longer tells the borders apart.
+        if (view.pixels_per_unit() * pixel - 1.0).abs() > 1e-6 {
+            return Err(ViewError::Camera("its field of view must be between 0 and 180 degrees"));
+        }
+        Ok(view)
+    }
+
+    /// So many units of view space, or a little more, a metre of the world can be: 1 where the transform is rigid.
+    pub(crate) fn stretch(&self) -> f64 {
+        let matrix = self.view_from_world.matrix3;
+        let largest = matrix.to_cols_array().into_iter().fold(0.0, |most, c| c.abs().max(most));
+        // The largest eigenvalue of MᵀM is no farther from their mean than what the mean leaves is long.
+        let m = matrix * largest.recip();
+        let squared = m.transpose() * m;
+        let mean = (squared.x_axis.x + squared.y_axis.y + squared.z_axis.z) / 3.0;
+        let rest = (squared - DMat3::from_diagonal(DVec3::splat(mean))).to_cols_array();
+        let rest = rest.into_iter().map(|c| c * c).sum::<f64>().sqrt();
+        (mean + rest).sqrt() * largest * (1.0 + 1e-12)
     }
 
     /// The eye in world space (for an orthographic view, a point on its axis at distance 0).
@@ -229,6 +253,20 @@ mod tests {
         let projection = Projection::Perspective { fov_y: 1.0, near: 0.1 };
         let view_from_world = DAffine3 { matrix3, translation: DVec3::new(1.0, -2.0, 3.0) };
         View { view_from_world, projection, width: 64, height: 48 }
+    }
+
+    #[test]
+    fn no_metre_is_longer_in_view_space_than_its_stretch() {
+        let rigid = scaled(DVec3::ONE).stretch();
+        assert!((1.0..1.0 + 1e-11).contains(&rigid), "{rigid}");
+        for size in [1e-200, 1e-9, 1.0, 1e9, 1e200] {
+            for scale in [DVec3::ONE, DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 1e-3, 3.0)] {
+                let view = scaled(scale * size);
+                let longest = scale.abs().max_element() * size;
+                let stretch = view.stretch();
+                assert!((longest..longest * 1.5).contains(&stretch), "{scale} {size}: {stretch}");
+            }
+        }
     }
 
     #[test]

@@ -37,12 +37,12 @@
 //! c and is then crossed on the way to q gives back what it took. A face that snapping turned over counts as it
 //! lies: N becomes a sum with signs, and where that is at least 1, a face that truly turns this way is there.
 //!
-//! *Depth.* Every face of the chain that may touch the square, widened by δ, takes part in the minimum. Of a
-//! face, the plane through three snapped corners is lowered until it is below every true corner. A true point
-//! of the face is a mean of true corners, hence not below the plane there; within a pixel and δ the plane falls
-//! by at most `(|a| + |b|)·(½ + δ)`. Where several faces cover pixels together, the minimum is taken over blocks of
-//! 4×4: over all faces that may touch the block, and of each over all of the block within the rectangle around the face.
-//! So each pixel's faces are among them, and none is taken for nearer than it is.
+//! *Depth.* Every face of the chain that may touch the square, widened by δ, takes part in the minimum. Of a face,
+//! the plane through three snapped corners is lowered until it is below every true corner. A true point of the face
+//! is a mean of true corners, hence not below the plane there; within a pixel and δ the plane falls by at most
+//! `(|a| + |b|)·(½ + δ)`. Where several faces cover pixels together, the minimum is taken over blocks of 4×4: over all
+//! faces that may touch the block, and of each over all of the block within the rectangle around the face. So each
+//! pixel's faces are among them, and none is taken for nearer than it is.
 //!
 //! *Cutting* at the near plane and at the guard band replaces the chain by another with the same cut points for
 //! both owners of an edge; what the near plane cuts ends there.
@@ -50,12 +50,12 @@
 //! # Four ways to draw a patch
 //!
 //! All rest on the same inequality; they differ in what they need not look at. A patch of one face ends at every
-//! edge, so a pixel is covered where it lies inside all of them (`loose`); of a closed convex patch of few faces, wholly
-//! beyond the near plane, where it lies inside all edges of the silhouette (`convex`). In a patch of faces that are not large
-//! N(c) is counted from the outline alone, and each face lowers depth in the whole rectangle around it, to its plane
-//! or to its farthest corner (`mosaic`). Else each face is filled, and only pixels that shared edges cross are
-//! counted (`fill`). In both, whole blocks that are covered raise one number, and only what is covered in part raises
-//! pixels.
+//! edge, so a pixel is covered where it lies inside all of them (`loose`); of a closed convex patch of few faces,
+//! wholly beyond the near plane, where it lies inside all edges of the silhouette (`convex`). In a patch of faces
+//! that are not large N(c) is counted from the outline alone, and each face lowers depth in the whole rectangle
+//! around it, to its plane or to its farthest corner (`mosaic`). Else each face is filled, and only pixels that
+//! shared edges cross are counted (`fill`). In both, whole blocks that are covered raise one number, and only what is
+//! covered in part raises pixels.
 //!
 //! The names in brackets are of the files that draw so.
 //!
@@ -130,8 +130,8 @@ pub struct OcclusionOptions {
     ///
     /// A direction of the picture in its corner is what comes nearest to the turned border, so that adding φ to each
     /// half, 2φ to each field of view, is not enough. A near plane that turns cuts differently, too: with the same
-    /// `near`, `eye_moves` is r + near · (√(1 + tan²h' + tan²v') − 1). For then an occluder counts only if it is no nearer
-    /// than near / cos Θ + r, Θ being half the wider view's diagonal, and so lies beyond the turned near plane
+    /// `near`, `eye_moves` is r + near · (√(1 + tan²h' + tan²v') − 1). For then an occluder counts only if it is no
+    /// nearer than near / cos Θ + r, Θ being half the wider view's diagonal, and so lies beyond the turned near plane
     /// wherever the picture shows it; and what the picture shows, beyond near · cos Θ − r, is not taken for outside.
     ///
     /// ```
@@ -215,9 +215,9 @@ impl std::ops::AddAssign for Drawn {
     }
 }
 
-/// The buffer's sizes or views differ.
+/// The views differ, or the margins, or how the image is cut into bands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("two occlusion buffers can be merged only if they have the same view and the same margins")]
+#[error("two occlusion buffers can be merged only if they have the same view, margins and bands")]
 pub struct CannotMerge;
 
 /// A conservative occlusion buffer: draw occluders, ask what they hide, in any order. See
@@ -268,9 +268,9 @@ impl Frame {
         Ok(Frame { meaning, ..self })
     }
 
-    /// The same with pixels `n` times as wide and as high. They are counted from the image's top left corner, so
-    /// that each is a square of n×n of the view's, and what is seen is the same at the same place; at the right and at
-    /// the bottom the last may reach beyond the view. So this shows all that the view shows, and what it calls hidden or
+    /// The same with pixels `n` times as wide and as high. They are counted from the image's top left corner, so that
+    /// each is a square of n×n of the view's, and what is seen is the same at the same place; at the right and at the
+    /// bottom the last may reach beyond the view. So this shows all that the view shows, and what it calls hidden or
     /// outside is so in the view: nothing that is promised depends on the size of pixels. Boxes may be asked about,
     /// and nothing else: `view` keeps the projection of the whole.
     pub(in crate::cull) fn coarser(mut self, n: u32) -> Result<Frame, ViewError> {
@@ -294,8 +294,9 @@ impl Frame {
         Ok(self)
     }
 
+    /// How far, in units of view space, what is drawn and the eye may come nearer to each other; and pixels to a unit.
     pub(super) fn margin(&self) -> Option<(f64, f64)> {
-        let metres = self.options.eye_moves + self.options.objects_move;
+        let metres = (self.options.eye_moves + self.options.objects_move) * self.view.stretch();
         (metres > 0.0).then_some((metres, self.pixels_a_metre))
     }
 

@@ -112,9 +112,10 @@ impl Ball {
     /// The rectangle around it on the screen and the nearest it comes; what is to be said of it where it has none.
     pub(super) fn on_screen(&self, view: &View) -> Result<ScreenRect, Verdict> {
         let c = view.view_from_world.transform_point3(self.center);
-        let size = c.abs().max_element() + self.center.abs().max_element();
+        let stretch = view.stretch();
+        let size = self.center.length() * stretch + view.view_from_world.translation.abs().max_element();
         // Rounding of the transform, and of what follows.
-        let radius = self.radius.abs() + size * 1e-12;
+        let radius = self.radius.abs() * stretch + size * 1e-12;
         if !(c.is_finite() && radius.is_finite()) {
             return Err(Verdict::Visible);
         }
@@ -128,11 +129,15 @@ impl Ball {
                 if distance - radius <= near {
                     return Err(Verdict::Visible);
                 }
-                // Tangents from the eye to the circle in which the axis' plane through the eye cuts the ball.
+                // Tangents from the eye to the circle in which the axis' plane through the eye cuts the ball, the one
+                // nearer to the axis by way of its conjugate: all sums are of numbers of one sign.
+                let below = (distance - radius) * (distance + radius);
                 let tangents = |a: f64| {
-                    let away = (a * a + distance * distance - radius * radius).sqrt() * radius;
-                    let below = distance * distance - radius * radius;
-                    [(a * distance - away) / below * scale, (a * distance + away) / below * scale]
+                    let (from_axis, long) = (a.abs(), (a * a + below).sqrt() * radius);
+                    let far = (from_axis * distance + long) / below;
+                    let near = (from_axis - radius) * (from_axis + radius) / (from_axis * distance + long);
+                    let sides = if a < 0.0 { [-far, -near] } else { [near, far] };
+                    sides.map(|side| side * scale)
                 };
                 (tangents(c.x), tangents(-c.y), near / (distance - radius))
             }

@@ -21,10 +21,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub struct SampledBuffer {
     view: View,
     screen_from_world: ScreenFromObject,
+    /// How many bands were asked for.
+    wanted: usize,
     /// Rows of each band but the last.
     rows: u32,
     bands: Vec<Mutex<Target>>,
-    level: Level,
+    pub(super) level: Level,
     drawn: AtomicU32,
 }
 
@@ -34,7 +36,7 @@ impl SampledBuffer {
         SampledBuffer::in_bands(view, 1)
     }
 
-    /// The same in about `bands` bands; a few for each thread are good.
+    /// The same in about `bands` bands; a few for each thread are good. What is drawn is set up anew in each.
     pub fn in_bands(view: &View, bands: usize) -> Result<SampledBuffer, ViewError> {
         view.validate()?;
         let rows = view.height.div_ceil(bands.clamp(1, 256) as u32).next_multiple_of(TILE);
@@ -42,6 +44,7 @@ impl SampledBuffer {
         Ok(SampledBuffer {
             view: *view,
             screen_from_world: ScreenFromObject::of_view(view),
+            wanted: bands,
             rows,
             bands: (0..view.height).step_by(rows as usize).map(band).collect(),
             level: Level::new(),
@@ -60,7 +63,7 @@ impl SampledBuffer {
     /// Makes it empty and looks from elsewhere; with another size than before it is made anew, in as many bands.
     pub fn look(&mut self, view: &View) -> Result<(), ViewError> {
         if (self.view.width, self.view.height) != (view.width, view.height) {
-            *self = SampledBuffer::in_bands(view, self.bands.len())?;
+            *self = SampledBuffer::in_bands(view, self.wanted)?;
             return Ok(());
         }
         view.validate()?;
@@ -107,8 +110,8 @@ impl SampledBuffer {
         }
     }
 
-    /// Adds what another buffer of the same view holds, as if its occluders had been drawn after those that are here:
-    /// number k of the other becomes k plus how many were drawn here.
+    /// Adds what another buffer of the same view, in as many bands, holds, as if its occluders had been drawn after
+    /// those that are here: number k of the other becomes k plus how many were drawn here.
     pub fn merge(&mut self, other: &SampledBuffer) -> Result<(), CannotMerge> {
         if self.view != other.view || self.rows != other.rows {
             return Err(CannotMerge);
@@ -124,12 +127,7 @@ impl SampledBuffer {
 
     /// Asks about many boxes of world space: one verdict each, in their order, into `verdicts`.
     pub fn ask(&self, boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
-        verdicts.clear();
-        let set = BoxSet::new(&self.screen_from_world, boxes.reach());
-        let mut bands = self.locked();
-        let image = Rect { left: 0, top: 0, right: self.view.width as i32, bottom: self.view.height as i32 };
-        dispatch!(self.level, simd => ask(simd, &mut bands, image, &set, boxes, verdicts));
-        verdicts.truncate(boxes.len());
+        self.ask_bands(&mut self.locked(), boxes, verdicts);
     }
 
     /// Asks about one box.
@@ -141,22 +139,58 @@ impl SampledBuffer {
 
     /// Asks about a ball. A radius or centre that is no finite number is never hidden.
     pub fn ask_sphere(&self, center: DVec3, radius: f64) -> Verdict {
-        match (Ball { center, radius }).on_screen(&self.view) {
-            // As much nearer as the rasteriser's rounding could make it.
-            Ok(rect) => self.ask_rect(&ScreenRect { depth: rect.depth * 1.000_001, ..rect }),
-            Err(verdict) => verdict,
-        }
+        self.judge_ball(&mut self.locked(), &Ball { center, radius })
     }
 
     /// Asks about many balls: one verdict each, in their order, into `verdicts`.
     pub fn ask_balls(&self, balls: &[Ball], verdicts: &mut Vec<Verdict>) {
+        let bands = &mut self.locked();
         verdicts.clear();
-        verdicts.extend(balls.iter().map(|ball| self.ask_sphere(ball.center, ball.radius)));
+        verdicts.extend(balls.iter().map(|ball| self.judge_ball(bands, ball)));
     }
 
     /// Asks about a rectangle of the screen: the pixels whose centres lie in it, or no farther from it than snapping
     /// to 1/256 pixel could move them. One without any is outside.
     pub fn ask_rect(&self, rect: &ScreenRect) -> Verdict {
+        self.judge_rect(&mut self.locked(), rect)
+    }
+
+    /// Asks about many rectangles of the screen: one verdict each, in their order, into `verdicts`.
+    pub fn ask_rects(&self, rects: &[ScreenRect], verdicts: &mut Vec<Verdict>) {
+        let bands = &mut self.locked();
+        verdicts.clear();
+        verdicts.extend(rects.iter().map(|rect| self.judge_rect(bands, rect)));
+    }
+
+    /// Asks about another mesh: hidden if the boxes around its triangles are. Finer than a box around it.
+    pub fn ask_mesh(&self, mesh: &Occludee, world_from_object: &DAffine3) -> Verdict {
+        let bands = &mut self.locked();
+        mesh.judge(world_from_object, |boxes, verdicts| self.ask_bands(bands, boxes, verdicts))
+    }
+
+    /// Asks about many meshes: one verdict each, in their order, into `verdicts`.
+    pub fn ask_meshes(&self, meshes: &[PlacedMesh], verdicts: &mut Vec<Verdict>) {
+        verdicts.clear();
+        verdicts.extend(meshes.iter().map(|one| self.ask_mesh(one.mesh, &one.world_from_object)));
+    }
+
+    fn ask_bands(&self, bands: &mut [MutexGuard<Target>], boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
+        verdicts.clear();
+        let set = BoxSet::new(&self.screen_from_world, boxes.reach());
+        let image = Rect { left: 0, top: 0, right: self.view.width as i32, bottom: self.view.height as i32 };
+        dispatch!(self.level, simd => ask(simd, bands, image, &set, boxes, verdicts));
+        verdicts.truncate(boxes.len());
+    }
+
+    fn judge_ball(&self, bands: &mut [MutexGuard<Target>], ball: &Ball) -> Verdict {
+        match ball.on_screen(&self.view) {
+            // As much nearer as the rasteriser's rounding could make it.
+            Ok(rect) => self.judge_rect(bands, &ScreenRect { depth: rect.depth * 1.000_001, ..rect }),
+            Err(verdict) => verdict,
+        }
+    }
+
+    fn judge_rect(&self, bands: &mut [MutexGuard<Target>], rect: &ScreenRect) -> Verdict {
         let ScreenRect { left, top, right, bottom, depth } = *rect;
         if !(left <= right && top <= bottom) || depth.is_nan() {
             return Verdict::Visible;
@@ -173,26 +207,8 @@ impl SampledBuffer {
         if rect.left >= rect.right || rect.top >= rect.bottom || depth <= 0.0 {
             return Verdict::Outside;
         }
-        let mut bands = self.locked();
-        let hidden = dispatch!(self.level, simd => hides(simd, &mut bands, rect, depth));
+        let hidden = dispatch!(self.level, simd => hides(simd, bands, rect, depth));
         if hidden { Verdict::Hidden } else { Verdict::Visible }
-    }
-
-    /// Asks about many rectangles of the screen: one verdict each, in their order, into `verdicts`.
-    pub fn ask_rects(&self, rects: &[ScreenRect], verdicts: &mut Vec<Verdict>) {
-        verdicts.clear();
-        verdicts.extend(rects.iter().map(|rect| self.ask_rect(rect)));
-    }
-
-    /// Asks about another mesh: hidden if the boxes around its triangles are. Finer than a box around it.
-    pub fn ask_mesh(&self, mesh: &Occludee, world_from_object: &DAffine3) -> Verdict {
-        mesh.judge(world_from_object, |boxes, verdicts| self.ask(boxes, verdicts))
-    }
-
-    /// Asks about many meshes: one verdict each, in their order, into `verdicts`.
-    pub fn ask_meshes(&self, meshes: &[PlacedMesh], verdicts: &mut Vec<Verdict>) {
-        verdicts.clear();
-        verdicts.extend(meshes.iter().map(|one| self.ask_mesh(one.mesh, &one.world_from_object)));
     }
 
     /// Depth of the nearest surface at a pixel's centre; 0 where there is none.
@@ -231,10 +247,13 @@ fn lock(band: &Mutex<Target>) -> MutexGuard<'_, Target> {
 /// Whether a rectangle of the image is hidden in every band that it meets.
 #[inline(always)]
 fn hides<S: Simd>(simd: S, bands: &mut [MutexGuard<Target>], rect: Rect, depth: f32) -> bool {
-    bands.iter_mut().all(|band| {
+    for band in bands {
         let top = band.top;
-        band.hides(simd, Rect { top: rect.top - top, bottom: rect.bottom - top, ..rect }, depth)
-    })
+        if !band.hides(simd, Rect { top: rect.top - top, bottom: rect.bottom - top, ..rect }, depth) {
+            return false;
+        }
+    }
+    true
 }
 
 #[inline(always)]

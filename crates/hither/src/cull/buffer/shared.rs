@@ -18,6 +18,8 @@ use std::sync::{RwLock, RwLockReadGuard};
 #[derive(Debug)]
 pub struct SharedBuffer {
     frame: Frame,
+    /// How many bands were asked for.
+    wanted: usize,
     /// Rows of each band but the last.
     rows: u32,
     bands: Vec<RwLock<Band>>,
@@ -28,10 +30,12 @@ impl SharedBuffer {
     /// there is one band: erosion needs what lies beyond a band's border.
     pub fn new(view: &View, options: &OcclusionOptions, bands: usize) -> Result<SharedBuffer, ViewError> {
         let frame = Frame::new(view, options)?;
+        let wanted = bands;
         let bands = if frame.margin().is_some() { 1 } else { bands.clamp(1, 256) as u32 };
         let rows = view.height.div_ceil(bands).next_multiple_of(64);
         let band = |top: u32| RwLock::new(Band::new(view.width, top, rows.min(view.height - top)));
-        Ok(SharedBuffer { frame, rows, bands: (0..view.height).step_by(rows as usize).map(band).collect() })
+        let bands = (0..view.height).step_by(rows as usize).map(band).collect();
+        Ok(SharedBuffer { frame, wanted, rows, bands })
     }
 
     /// Makes it empty.
@@ -46,7 +50,7 @@ impl SharedBuffer {
         let before = &self.frame.view;
         if (before.width, before.height) != (view.width, view.height) {
             let options = self.frame.options;
-            *self = SharedBuffer::new(view, &options, self.bands.len())?;
+            *self = SharedBuffer::new(view, &options, self.wanted)?;
             return Ok(());
         }
         self.frame = Frame::new(view, &self.frame.options)?;

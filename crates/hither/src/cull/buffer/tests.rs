@@ -353,8 +353,8 @@ fn convex_bodies_cover_what_their_faces_cover() {
             farther += u32::from(*fast > 0.0 && *fast < plain * 0.99);
         }
     }
-    // A plane, lowered by what it falls within half a pixel, is below its neighbour's for about a pixel beyond their edge.
-    // At the rim of a body no block of it is there that lies nearer.
+    // A plane, lowered by what it falls within half a pixel, is below its neighbour's for about a pixel beyond their
+    // edge. At the rim of a body no block of it is there that lies nearer.
     let differ = (one * 100).max(nearer * 25).max(farther * 50);
     assert!(
         both > 200_000 && differ < both,

@@ -24,10 +24,11 @@
 //! continuous image; or, with [`Meaning::Sampled`], at no pixel's centre. As the former holds at every resolution, the
 //! buffer's pixels may be coarser than the view's ([`CullOptions::coarseness`]).
 //!
-//! *Tried, and not kept.* Occluders by the area-angle of their surfaces [Coorg & Teller 1996], summed over each mesh for
-//! the three axes, against that of the box around it, instead of by the box alone: 2 to 7 % fewer faces at 0.6 % more
-//! instances found in a market of 22,000 parts, and nothing in an office of open modules, of which each covers as much
-//! as the threshold asks. No look inside meshes of a single box: no difference beyond what one run differs from the next.
+//! *Tried, and not kept.* Occluders by the area-angle of their surfaces [Coorg & Teller 1996], summed over each mesh
+//! for the three axes, against that of the box around it, instead of by the box alone: 2 to 7 % fewer faces at 0.6 %
+//! more instances found in a market of 22,000 parts, and nothing in an office of open modules, of which each covers
+//! as much as the threshold asks. No look inside meshes of a single box: no difference beyond what one run differs
+//! from the next.
 
 mod walk;
 
@@ -53,14 +54,14 @@ pub struct CullOptions {
     /// is seen through gaps of a few pixels. Thresholds in pixels are rounded up to whole ones of these. 1 if sampled:
     /// centres are those of the view's pixels.
     pub coarseness: u32,
-    /// Instances whose boxes cover fewer pixels of the view than this are not drawn as occluders. Smaller hides more, and
-    /// costs more.
+    /// Instances whose boxes cover fewer pixels of the view than this are not drawn as occluders. Smaller hides more,
+    /// and costs more.
     pub least_occluder_px: u32,
     /// Connected pieces of an occluder that touch fewer pixels of the view across or down are left out.
     pub least_piece_px: u32,
-    /// So are pieces whose bounding boxes cover fewer pixels of the view than this for each of their faces: they cost more
-    /// than they hide. Of closed convex pieces of few faces a sixteenth is enough. If another is closed, and large enough, a
-    /// few boxes inside of it are drawn instead.
+    /// So are pieces whose bounding boxes cover fewer pixels of the view than this for each of their faces: they cost
+    /// more than they hide. Of closed convex pieces of few faces a sixteenth is enough. If another is closed, and
+    /// large enough, a few boxes inside of it are drawn instead.
     pub least_px_a_face: u32,
     /// Boxes of a mesh's own tree that are asked about before an instance counts as visible.
     pub boxes_an_instance: u32,
@@ -249,7 +250,8 @@ impl Culler {
     }
 
     /// Which instances may be seen in each of several views: the cascades of a shadow, the faces of a cube, two
-    /// eyes ([`View::around_off_axis`] for those of a headset). They are culled at once, on as many threads as rayon has.
+    /// eyes (of a headset, not sampled: [`View::around_off_axis`]). They are culled at once, on as many threads as
+    /// rayon has.
     pub fn cull_views(
         &mut self,
         index: &SceneIndex,

@@ -417,7 +417,12 @@ fn what_may_be_seen_comes_nearest_first() {
             let depths: Vec<f64> = found.visible.iter().map(depth).collect();
             for pair in depths.windows(2) {
                 pairs += 1;
-                assert!(pair[0] >= pair[1] * (1.0 - 1e-5) - 1e-5, "seed {seed}: {pair:?} of {depths:?}");
+                // f32 in an orthographic view is as exact for what is near as for what is far.
+                let least = match view.projection {
+                    Projection::Perspective { .. } => pair[1] * (1.0 - 1e-5),
+                    Projection::Orthographic { .. } => pair[1] - 1e-5,
+                };
+                assert!(pair[0] >= least, "seed {seed}: {pair:?} of {depths:?}");
             }
         }
     }

@@ -100,3 +100,77 @@ fn what_is_masked_transparent_or_no_number_of_a_mesh_can_be_seen() {
     assert!(Occludee::new(&mesh.positions, &[[0, 1, 4]]).is_err());
     assert_eq!(buffer.ask_mesh(&Occludee::default(), &DAffine3::IDENTITY), Verdict::Outside);
 }
+
+#[test]
+fn the_rectangle_of_a_ball_touches_it() {
+    let random = &mut Random::new(77);
+    let projection = Projection::Perspective { fov_y: 1.0, near: 0.5 };
+    let view = View { view_from_world: DAffine3::IDENTITY, projection, width: 1000, height: 700 };
+    /// A line of sight is n / ONE to the side of the axis at distance 1.
+    const ONE: f64 = (1i64 << 34) as f64;
+    for _ in 0..100_000 {
+        let distance = 2 + random.below(8190);
+        // Often the eye is just outside of it.
+        let radius = if random.one_in(2) { distance - 1 } else { random.below(distance) };
+        let [a, b] = [(); 2].map(|()| random.below(16384) as i32 - 8192);
+        let center = DVec3::new(f64::from(a), f64::from(b), -f64::from(distance));
+        let rect = Ball { center, radius: f64::from(radius) }.on_screen(&view).unwrap();
+        let sides = [
+            (a, rect.left, 500.0, 1.0),
+            (a, rect.right, 500.0, -1.0),
+            (-b, rect.top, 350.0, 1.0),
+            (-b, rect.bottom, 350.0, -1.0),
+        ];
+        let reach: f64 = sides.iter().map(|(_, side, middle, _)| (side - middle).abs()).sum();
+        let reach = reach / view.pixels_per_unit();
+        for (a, side, middle, inwards) in sides {
+            let line = (side - middle) / view.pixels_per_unit();
+            // Whether it meets the circle, in whole numbers.
+            let meets = |line: f64| {
+                let (n, one) = ((line * ONE).round() as i128, ONE as i128);
+                let (a, distance, radius) = (i128::from(a), i128::from(distance), i128::from(radius));
+                (a * one - n * distance).pow(2) <= radius.pow(2) * (one * one + n * n)
+            };
+            assert!(!meets(line), "{center}, radius {radius}: {rect:?}");
+            // The ball asked about is larger by what rounding may move it, which tells the more the nearer the eye.
+            let rounding = 1e-12 * center.length() / f64::from(distance - radius);
+            let closer = line + inwards * (2e-8 + reach * (4e-9 + 2.0 * rounding));
+            assert!(radius == 0 || meets(closer), "{center}, radius {radius}: {rect:?} is too large");
+        }
+    }
+}
+
+#[test]
+fn what_is_asked_about_in_a_view_that_scales_is_as_large_as_it_is_seen() {
+    let random = &mut Random::new(4);
+    let (wall, plain) = wall();
+    let mut counts = [0; 3];
+    for round in 0..300 {
+        let scale = [0.01, 1.0, 2.0, 50.0][round % 4];
+        let to_view = DAffine3::from_scale(DVec3::splat(scale)) * plain.view_from_world;
+        let view = View { view_from_world: to_view, ..plain };
+        let mut buffer = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
+        let sampled = SampledBuffer::new(&view).unwrap();
+        let at = DAffine3::from_scale_rotation_translation(
+            DVec3::new(2.0, 2.0, 0.1) * random.between(0.2, 2.0),
+            glam::DQuat::IDENTITY,
+            random.point(1.0),
+        );
+        buffer.draw(&wall, &at);
+        sampled.draw(&wall, &at);
+        for _ in 0..40 {
+            let (center, half) = (random.point(6.0), random.between(0.01, 1.0));
+            // The ball holds the box: what hides it hides the box.
+            let radius = half * 1.733;
+            for (ball, within) in [
+                (buffer.ask_sphere(center, radius), buffer.ask_box(&cube_at(center, half))),
+                (sampled.ask_sphere(center, radius), sampled.ask_box(&cube_at(center, half))),
+            ] {
+                counts[ball as usize] += 1;
+                let holds = ball == Verdict::Visible || within == ball;
+                assert!(holds || within == Verdict::Outside, "{center} {half}, scaled by {scale}");
+            }
+        }
+    }
+    assert!(counts.iter().all(|&c| c > 100), "{counts:?}");
+}

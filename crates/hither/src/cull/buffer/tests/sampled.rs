@@ -34,7 +34,8 @@ fn inside(random: &mut Random, ball: bool) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 #[test]
 fn what_is_hidden_from_samples_would_be_drawn_nowhere() {
     let random = &mut Random::new(31);
-    let mut counts = [0; 3];
+    let mut counts = [[0; 3]; 2];
+    let mut only_the_mesh = 0;
     for seed in 0..250 {
         let scene = trouble::scene(seed + 900);
         let view = View { width: 97, height: 75, ..trouble::view(seed + 900) };
@@ -49,18 +50,56 @@ fn what_is_hidden_from_samples_would_be_drawn_nowhere() {
             let mesh = Occludee::new(&positions, &triangles).unwrap();
             let around = Aabb { min: center - half, max: center + half };
             let of_hull = if ball { buffer.ask_sphere(center, half) } else { buffer.ask_box(&around) };
-            counts[of_hull as usize] += 1;
             let verdicts = [of_hull, buffer.ask_mesh(&mesh, &at)];
+            (0..2).for_each(|k| counts[k][verdicts[k] as usize] += 1);
             if verdicts == [Verdict::Visible; 2] {
                 continue;
             }
+            only_the_mesh += u32::from(of_hull == Verdict::Visible);
             let with_it = drawn_sampled(&scene, &occluders, &view, bands);
             let number = with_it.draw(&Occluder::new(&positions, &triangles, Sides::Both).unwrap(), &at);
             let shows = occluders_at(&with_it).contains(&Some(number));
             assert!(!shows, "seed {seed}: {around:?} shows and was called {verdicts:?}, a ball: {ball}");
         }
     }
-    assert!(counts.iter().all(|&c| c > 300), "{counts:?}");
+    assert!(counts.as_flattened().iter().all(|&c| c > 300), "{counts:?}");
+    assert!(only_the_mesh > 20, "{only_the_mesh}");
+}
+
+#[test]
+fn a_rectangle_reaches_as_far_as_snapping() {
+    let (wall, view) = wall();
+    let buffer = SampledBuffer::in_bands(&view, 8).unwrap();
+    buffer.draw(&wall, &DAffine3::from_scale(DVec3::new(2.0, 2.0, 0.1)));
+    let covered = |x: u32, y: u32| buffer.depth(x, y) > 0.0;
+    let (x, y) = (view.width / 2, view.height / 2);
+    let left = (0..x).find(|&x| covered(x, y)).unwrap();
+    let right = (x..view.width).rfind(|&x| covered(x, y)).unwrap();
+    let top = (0..y).find(|&y| covered(x, y)).unwrap();
+    let bottom = (y..view.height).rfind(|&y| covered(x, y)).unwrap();
+    // From the last covered centre to the first beyond it, less a little, at all four sides.
+    let depth = buffer.depth(x, y) * 0.5;
+    let ask = |beyond: [f64; 4]| {
+        buffer.ask_rect(&ScreenRect {
+            left: f64::from(left) - 0.5 + beyond[0],
+            top: f64::from(top) - 0.5 + beyond[1],
+            right: f64::from(right) + 1.5 - beyond[2],
+            bottom: f64::from(bottom) + 1.5 - beyond[3],
+            depth,
+        })
+    };
+    let (snap, hair) = (1.0 / 256.0, 1e-9);
+    assert_eq!(ask([snap + hair; 4]), Verdict::Hidden);
+    for side in 0..4 {
+        let mut beyond = [snap + hair; 4];
+        beyond[side] = snap - hair;
+        assert_eq!(ask(beyond), Verdict::Visible, "side {side}");
+    }
+    // Depths: behind by any bit is hidden, and as near is not.
+    let [x, y] = [x, y].map(|v| f64::from(v) + 0.5);
+    let held = buffer.depth(view.width / 2, view.height / 2);
+    let at = |depth: f32| buffer.ask_rect(&ScreenRect { left: x, top: y, right: x, bottom: y, depth });
+    assert_eq!([at(held.next_down()), at(held)], [Verdict::Hidden, Verdict::Visible]);
 }
 
 #[test]
@@ -104,12 +143,25 @@ fn a_rectangle_asks_the_samples_in_it() {
     assert!(counts.iter().all(|&c| c > 300), "{counts:?}");
 }
 
+/// A scene and a view of more than one band, its occluders, and many boxes.
+fn in_several_bands(seed: u64) -> (Scene, View, Vec<Occluder>, Boxes) {
+    let scene = trouble::scene(seed + 40);
+    let view = View { width: 90, height: 130, ..trouble::view(seed + 40) };
+    let boxes = (0..200)
+        .map(|k| Random::new(seed * 1000 + k))
+        .map(|mut r| (r.point(9.0), r.between(0.01, 0.6)))
+        .map(|(center, half)| Aabb { min: center - half, max: center + half })
+        .collect();
+    let occluders = occluders_of(&scene);
+    (scene, view, occluders, boxes)
+}
+
 #[test]
-fn samples_are_the_same_in_bands_of_threads_and_merged() {
+fn merging_samples_is_drawing_one_after_the_other() {
+    let mut hidden = 0;
     for seed in 0..80 {
-        let scene = trouble::scene(seed + 40);
-        let view = View { width: 90, height: 130, ..trouble::view(seed + 40) };
-        let (occluders, instances) = (occluders_of(&scene), scene.instances());
+        let (scene, view, occluders, boxes) = in_several_bands(seed);
+        let instances = scene.instances();
         let alone = drawn_sampled(&scene, &occluders, &view, 1);
         let halves = [(); 2].map(|()| SampledBuffer::in_bands(&view, 3).unwrap());
         let (first, last) = instances.split_at(instances.len() / 2);
@@ -122,38 +174,59 @@ fn samples_are_the_same_in_bands_of_threads_and_merged() {
         merged.merge(&other).unwrap();
         assert!(merged.depths() == alone.depths(), "seed {seed}: merged");
         assert!(occluders_at(&merged) == occluders_at(&alone), "seed {seed}: numbers merged");
-        // Merging leaves minima that are true.
-        let boxes: Boxes = (0..200)
-            .map(|k| Random::new(seed * 1000 + k))
-            .map(|mut r| (r.point(9.0), r.between(0.01, 0.6)))
-            .map(|(center, half)| Aabb { min: center - half, max: center + half })
-            .collect();
+        // Minima are true again.
         let (mut of_merged, mut of_alone) = (Vec::new(), Vec::new());
-        merged.ask(&boxes, &mut of_merged);
         alone.ask(&boxes, &mut of_alone);
-        assert!(of_merged == of_alone, "seed {seed}: asked of what was merged");
+        hidden += of_alone.iter().filter(|v| **v == Verdict::Hidden).count();
+        for level in levels() {
+            merged.level = level;
+            merged.ask(&boxes, &mut of_merged);
+            assert!(of_merged == of_alone, "seed {seed}: {level:?}");
+        }
+        // What is drawn after merging is numbered on.
+        let number = merged.draw(&occluders[0], &DAffine3::from_translation(DVec3::Z));
+        assert_eq!(number, instances.len() as u32);
+        assert_eq!(alone.draw(&occluders[0], &DAffine3::from_translation(DVec3::Z)), number);
+        assert!(occluders_at(&merged) == occluders_at(&alone), "seed {seed}: numbers go on");
+        merged.clear();
+        assert_eq!(merged.draw(&occluders[0], &DAffine3::IDENTITY), 0);
+        assert_eq!(merged.merge(&alone), Err(CannotMerge));
+    }
+    assert!(hidden > 500, "{hidden}");
+}
 
+#[test]
+fn threads_that_draw_samples_and_ask_at_once_change_nothing() {
+    for seed in 0..80 {
+        let (scene, view, occluders, boxes) = in_several_bands(seed);
+        let instances = scene.instances();
+        let alone = drawn_sampled(&scene, &occluders, &view, 1);
+        let mut of_alone = Vec::new();
+        alone.ask(&boxes, &mut of_alone);
         let mut shared = SampledBuffer::in_bands(&view, 4).unwrap();
-        std::thread::scope(|scope| {
-            for me in 0..2 {
-                let (shared, instances, occluders, boxes, end) =
-                    (&shared, &instances, &occluders, &boxes, &of_alone);
-                scope.spawn(move || {
-                    let mut verdicts = Vec::new();
-                    for i in instances.iter().skip(me).step_by(2) {
-                        shared.draw(&occluders[i.mesh as usize], &i.world_from_mesh);
-                        shared.ask(boxes, &mut verdicts);
-                        let early = |(now, end): (&Verdict, &Verdict)| {
-                            *now == Verdict::Hidden && *end != Verdict::Hidden
-                        };
-                        assert!(!verdicts.iter().zip(end).any(early), "seed {seed}");
-                    }
-                });
+        let work = |me: usize| {
+            let mut verdicts = Vec::new();
+            for i in instances.iter().skip(me).step_by(2) {
+                shared.draw(&occluders[i.mesh as usize], &i.world_from_mesh);
+                shared.ask(&boxes, &mut verdicts);
+                let mut both = verdicts.iter().zip(&of_alone);
+                let holds = both.all(|(now, end)| *now != Verdict::Hidden || *end == Verdict::Hidden);
+                assert!(holds, "seed {seed}");
             }
+        };
+        std::thread::scope(|scope| {
+            scope.spawn(|| work(1));
+            work(0);
         });
         assert!(shared.depths() == alone.depths(), "seed {seed}: by threads");
-        shared.look(&trouble::view(seed)).unwrap();
-        assert!(shared.depths().iter().all(|&d| d == 0.0), "seed {seed}");
-        assert_eq!(merged.merge(&shared), Err(CannotMerge));
+        for turned in [View { width: 90, height: 130, ..trouble::view(seed) }, trouble::view(seed)] {
+            shared.look(&turned).unwrap();
+            assert!(shared.depths().iter().all(|&d| d == 0.0), "seed {seed}");
+            for i in &instances {
+                shared.draw(&occluders[i.mesh as usize], &i.world_from_mesh);
+            }
+            let anew = drawn_sampled(&scene, &occluders, &turned, 1);
+            assert!(shared.depths() == anew.depths(), "seed {seed}: turned");
+        }
     }
 }
