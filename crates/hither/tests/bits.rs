@@ -42,8 +42,8 @@ const BUFFERS: [u64; 6] = [
     0x2c7f_e1e3_ff83_33b2,
 ];
 
-/// Depths of sampled buffers, and which occluder was drawn.
-const SAMPLED: [u64; 3] = [0xb62a_a1dc_fc88_bac7, 0xddb4_38e5_e6f6_beb8, 0x099b_af4b_199e_a93f];
+/// Depths of sampled buffers, which occluder was drawn, and their verdicts.
+const SAMPLED: [u64; 3] = [0xccec_8cfc_bdcd_8a01, 0x83ad_7fb2_0a7b_fece, 0x01af_04f5_f6c7_96ed];
 
 /// Instances that culling finds, nearest first.
 const FOUND: [u64; 6] = [
@@ -222,8 +222,8 @@ fn pictures_have_the_same_bits_everywhere() {
     }
 }
 
-/// Adds what an occlusion buffer says of many boxes, balls and rectangles of the screen.
-fn ask(digest: &mut Digest, buffer: &OcclusionBuffer, seed: u64) -> [u32; 3] {
+/// Boxes, balls and rectangles of the screen to ask about.
+fn questions(seed: u64) -> (Boxes, Vec<Ball>, Vec<ScreenRect>) {
     let random = &mut Random::new(seed ^ 0xA5C);
     let bounds = |random: &mut Random| {
         let (at, size) = (random.point(9.0), random.point(0.6).abs());
@@ -239,18 +239,14 @@ fn ask(digest: &mut Digest, buffer: &OcclusionBuffer, seed: u64) -> [u32; 3] {
             ScreenRect { left, top, right, bottom, depth: random.between(0.0, 0.2) as f32 }
         })
         .collect();
-    let (mut verdicts, mut more) = (Vec::new(), Vec::new());
-    buffer.ask(&boxes, &mut verdicts);
-    buffer.ask_balls(&balls, &mut more);
-    verdicts.append(&mut more);
-    buffer.ask_rects(&rects, &mut more);
-    verdicts.append(&mut more);
-    let mut counts = [0; 3];
-    for verdict in verdicts {
-        digest.add(verdict as u32);
-        counts[verdict as usize] += 1;
-    }
-    counts
+    (boxes, balls, rects)
+}
+
+/// Adds verdicts; returns how many are hidden.
+fn add(digest: &mut Digest, verdicts: [Vec<Verdict>; 3]) -> u32 {
+    let verdicts = verdicts.concat();
+    verdicts.iter().for_each(|verdict| digest.add(*verdict as u32));
+    verdicts.iter().filter(|verdict| **verdict == Verdict::Hidden).count() as u32
 }
 
 /// The occluders of a scene, and where each of its instances stands.
@@ -270,8 +266,13 @@ fn buffer(seed: u64, level: Level) -> (u64, u32) {
     }
     let mut digest = Digest::new();
     buffer.depths().iter().for_each(|depth| digest.add(depth.to_bits()));
-    let counts = ask(&mut digest, &buffer, seed);
-    (digest.0, counts[Verdict::Hidden as usize])
+    let (boxes, balls, rects) = questions(seed);
+    let mut verdicts = [const { Vec::new() }; 3];
+    buffer.ask(&boxes, &mut verdicts[0]);
+    buffer.ask_balls(&balls, &mut verdicts[1]);
+    buffer.ask_rects(&rects, &mut verdicts[2]);
+    let hidden = add(&mut digest, verdicts);
+    (digest.0, hidden)
 }
 
 #[test]
@@ -284,25 +285,36 @@ fn occlusion_buffers_have_the_same_bits_everywhere() {
     }
 }
 
-/// What a sampled buffer holds.
-fn sampled(seed: u64) -> u64 {
+/// What a sampled buffer holds and answers that was merged from two; and how much it calls hidden.
+fn sampled(seed: u64) -> (u64, u32) {
     let (scene, view) = (scene(seed), view(seed));
     let occluders = occluders(&scene);
-    let buffer = SampledBuffer::new(&view).unwrap();
-    for instance in scene.instances() {
-        buffer.draw(&occluders[instance.mesh as usize], &instance.world_from_mesh);
+    let [mut buffer, other] = [(); 2].map(|()| SampledBuffer::in_bands(&view, 3).unwrap());
+    for (number, instance) in scene.instances().iter().enumerate() {
+        let half = if number % 2 == 0 { &buffer } else { &other };
+        half.draw(&occluders[instance.mesh as usize], &instance.world_from_mesh);
     }
+    buffer.merge(&other).unwrap();
     let mut digest = Digest::new();
     for (x, y) in (0..view.height).flat_map(|y| (0..view.width).map(move |x| (x, y))) {
         digest.add(buffer.depth(x, y).to_bits());
         digest.add(buffer.occluder(x, y).unwrap_or(u32::MAX));
     }
-    digest.0
+    let (boxes, balls, rects) = questions(seed);
+    let mut verdicts = [const { Vec::new() }; 3];
+    buffer.ask(&boxes, &mut verdicts[0]);
+    buffer.ask_balls(&balls, &mut verdicts[1]);
+    buffer.ask_rects(&rects, &mut verdicts[2]);
+    let hidden = add(&mut digest, verdicts);
+    (digest.0, hidden)
 }
 
 #[test]
 fn sampled_buffers_have_the_same_bits_everywhere() {
-    check(std::array::from_fn(|seed| sampled(seed as u64)), SAMPLED, "sampled");
+    let got = std::array::from_fn(|seed| sampled(seed as u64));
+    check(got.map(|g| g.0), SAMPLED, "sampled");
+    let hidden: u32 = got.iter().map(|g| g.1).sum();
+    assert!(hidden > 250, "only {hidden} were hidden");
 }
 
 #[test]

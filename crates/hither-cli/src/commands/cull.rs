@@ -81,8 +81,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     planes::check_map(arguments)?;
     outputs::check_report(to)?;
     arguments.view.check_size()?;
-    // The occlusion buffer: a depth, and its share of blocks and tiles.
-    arguments.view.check_memory(6)?;
+    arguments.view.check_memory(match arguments.method {
+        // A depth, and its share of blocks and tiles.
+        MethodName::Buffer => 6,
+        MethodName::Planes => 0,
+        // The depth buffer with ids, and the frame.
+        MethodName::Exact => 22,
+    })?;
     let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
     if arguments.method == MethodName::Planes {
         planes::check_scene(&scene, &arguments.scene)?;
