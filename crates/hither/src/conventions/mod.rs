@@ -168,10 +168,10 @@ impl View {
 
     /// So many units of view space, or a little more, a metre of the world can be: 1 where the transform is rigid.
     pub(crate) fn stretch(&self) -> f64 {
-        let matrix = self.view_from_world.matrix3;
-        let largest = matrix.to_cols_array().into_iter().fold(0.0, |most, c| c.abs().max(most));
+        let matrix = self.view_from_world.matrix3.to_cols_array();
+        let largest = matrix.into_iter().fold(0.0, |most, c| c.abs().max(most));
         // The largest eigenvalue of MᵀM is no farther from their mean than what the mean leaves is long.
-        let m = matrix * largest.recip();
+        let m = DMat3::from_cols_array(&matrix.map(|c| c / largest));
         let squared = m.transpose() * m;
         let mean = (squared.x_axis.x + squared.y_axis.y + squared.z_axis.z) / 3.0;
         let rest = (squared - DMat3::from_diagonal(DVec3::splat(mean))).to_cols_array();
@@ -259,7 +259,7 @@ mod tests {
     fn no_metre_is_longer_in_view_space_than_its_stretch() {
         let rigid = scaled(DVec3::ONE).stretch();
         assert!((1.0..1.0 + 1e-11).contains(&rigid), "{rigid}");
-        for size in [1e-200, 1e-9, 1.0, 1e9, 1e200] {
+        for size in [1e-310, 1e-200, 1e-9, 1.0, 1e9, 1e200] {
             for scale in [DVec3::ONE, DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 1e-3, 3.0)] {
                 let view = scaled(scale * size);
                 let longest = scale.abs().max_element() * size;
