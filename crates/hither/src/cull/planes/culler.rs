@@ -151,7 +151,8 @@ impl PlaneCuller {
                 *side = plane(-side.0, eye);
             }
         }
-        frustum.push(plane(axis, eye + axis * near));
+        // Where view space is sheared or stretched, its axis is not at right angles to the near plane.
+        frustum.push(plane(-view.view_from_world.matrix3.row(2), eye + axis * near));
         let mut unseen = [eye; 5];
         for (corner, ray) in unseen[1..].iter_mut().zip(rays) {
             *corner = eye + ray * near;

@@ -6,7 +6,7 @@ use crate::reference::Caster;
 use crate::reference::all_around::sightings;
 use crate::reference::trouble::{self, Random};
 use crate::scene::Scene;
-use glam::DVec3;
+use glam::{DAffine3, DMat3, DVec3};
 
 /// Parts thinner than this are not held against an answer: the reference cuts in `f64`.
 const THINNEST: f64 = 1e-7;
@@ -66,9 +66,16 @@ fn what_a_ray_meets_in_a_view_is_never_hidden() {
     let mut rays = 0;
     for seed in 0..1000 {
         let scene = trouble::scene(seed);
-        let view = trouble::view(seed);
+        let mut view = trouble::view(seed);
         if matches!(view.projection, Projection::Orthographic { .. }) {
             continue;
+        }
+        if seed % 4 == 0 {
+            // View space need not be rigid.
+            let random = &mut Random::new(seed);
+            let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis + random.point(0.4));
+            let sheared = DMat3::from_cols(x, y, z) * random.between(0.1, 4.0);
+            view.view_from_world = DAffine3::from_mat3(sheared) * view.view_from_world;
         }
         let mut culler = PlaneCuller::new(&scene, &PlanesOptions::default());
         let culled = culler.look(&view).unwrap();
@@ -104,7 +111,7 @@ fn far_from_the_origin_nothing_visible_is_hidden_either() {
         let offset = DVec3::new(far, -far, 0.5 * far);
         for node in &mut scene.groups[1].nodes {
             if node.parent.is_none() {
-                let moved = glam::DAffine3::from_translation(offset) * node.local.matrix();
+                let moved = DAffine3::from_translation(offset) * node.local.matrix();
                 node.local = crate::scene::Transform::Affine(moved);
             }
         }
