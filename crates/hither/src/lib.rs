@@ -10,8 +10,9 @@
 //!
 //! # In debug builds
 //!
-//! Vector code that is not optimised is many times slower, and keeps every vector that it made on the stack:
-//! up to 3 MiB, more than Rust gives a thread by itself. A program that depends on this crate wants in its `Cargo.toml`
+//! Vector code that is not optimised is slow, and keeps every vector that it made on the stack: drawing into occlusion
+//! buffers has been seen to need more than the 2 MiB that Rust gives a thread by itself. A program that depends on this
+//! crate wants in its `Cargo.toml`
 //!
 //! ```toml
 //! [profile.dev.package]
