@@ -190,7 +190,7 @@ fn fill<S: Simd>(
     let paint = Paint::new(simd, target, t, how);
     let block_rise = paint.plane_rise(3.0);
     let mut filling = Filling { coverage: Coverage::new(simd, t, target), paint, block_rise };
-    fill_cells(simd, target, &mut filling, t.depth_max, &blocks_of(t, target), is_hole);
+    fill_cells(simd, target, &mut filling, &blocks_of(t, target), is_hole);
     let wrote = filling.paint.wrote;
     if wrote {
         target.surfaces.push(how.id);
@@ -205,7 +205,6 @@ fn fill_cells<S: Simd>(
     simd: S,
     target: &mut Target,
     f: &mut Filling<S>,
-    depth_max: f32,
     blocks: &Rect,
     is_hole: &mut dyn FnMut(i32, i32) -> bool,
 ) {
@@ -221,13 +220,13 @@ fn fill_cells<S: Simd>(
                 (bottom - cell_y * 4).min(3),
             );
             if choose {
-                tiles &= tiles_of_cell(simd, target, f, depth_max, cell_x, cell_y);
+                tiles &= tiles_of_cell(simd, target, f, cell_x, cell_y);
             }
             while tiles != 0 {
                 let c = tiles.trailing_zeros() as i32;
                 tiles &= tiles - 1;
                 let (x, y) = (cell_x * 4 + (c & 3), cell_y * 4 + (c >> 2));
-                fill_tile(simd, target, f, depth_max, x, y, is_hole);
+                fill_tile(simd, target, f, x, y, is_hole);
             }
         }
     }
@@ -238,14 +237,7 @@ const CHOOSE: i32 = 3;
 
 /// Which of a 64-pixel cell's tiles the triangle may show in.
 #[inline(always)]
-fn tiles_of_cell<S: Simd>(
-    simd: S,
-    target: &mut Target,
-    f: &Filling<S>,
-    depth_max: f32,
-    cell_x: i32,
-    cell_y: i32,
-) -> u32 {
+fn tiles_of_cell<S: Simd>(simd: S, target: &mut Target, f: &Filling<S>, cell_x: i32, cell_y: i32) -> u32 {
     let mut tiles = f.coverage.of_cell(simd, cell_x * 64, cell_y * 64);
     if f.paint.how.hierarchical {
         if target.visits.is_some() {
@@ -253,7 +245,7 @@ fn tiles_of_cell<S: Simd>(
         }
         let z = f.paint.plane_at(target, cell_x * 64, cell_y * 64);
         let bound = z + f.paint.plane_rise(15.0) + f.paint.plane_margin(z, 63.0);
-        let bounds = (f.paint.depth_steps * 16.0 + bound).min(f32x16::splat(simd, depth_max));
+        let bounds = f.paint.clamped(simd, f.paint.depth_steps * 16.0 + bound);
         if let Some(minima) = target.tile_minima(simd, cell_x as usize, cell_y as usize) {
             let minima = f32x16::from_slice(simd, minima);
             tiles &= bounds.simd_ge(minima).to_bitmask() as u32;
@@ -267,7 +259,6 @@ fn fill_tile<S: Simd>(
     simd: S,
     target: &mut Target,
     f: &mut Filling<S>,
-    depth_max: f32,
     tile_x: i32,
     tile_y: i32,
     is_hole: &mut dyn FnMut(i32, i32) -> bool,
@@ -281,8 +272,8 @@ fn fill_tile<S: Simd>(
     }
     let origins = f.paint.plane_at_blocks(simd, target, x, y);
     if f.paint.how.hierarchical {
-        let bounds = (origins + f.paint.plane_margins(simd, origins) + f.block_rise)
-            .min(f32x16::splat(simd, depth_max));
+        let bounds = origins + f.paint.plane_margins(simd, origins) + f.block_rise;
+        let bounds = f.paint.clamped(simd, bounds);
         let minima = f32x16::from_slice(simd, target.block_minima(tile));
         if target.visits.is_some() {
             target.count_polygon_visit((x, y), 4, blocks);
@@ -315,12 +306,11 @@ fn fill_tile<S: Simd>(
 /// Writes a tile that nothing was drawn in and that the triangle covers whole: nothing is read or compared.
 #[inline(always)]
 fn cover_tile<S: Simd>(simd: S, target: &mut Target, f: &mut Filling<S>, tile: usize, origins: f32x16<S>) {
-    let (low, high) = (f32x16::splat(simd, f.paint.depth_min), f32x16::splat(simd, f.paint.depth_max));
     let mut at_origins = [0f32; 16];
     origins.store_slice(&mut at_origins);
     let blocks = &mut target.depth[tile * 16..tile * 16 + 16];
     for c in 0..16 {
-        let z = (f.paint.depth_steps + at_origins[c]).max(low).min(high);
+        let z = f.paint.clamped(simd, f.paint.depth_steps + at_origins[c]);
         z.store_slice(&mut blocks[c].0);
     }
     target.block_id[tile * 16..tile * 16 + 16].copy_from_slice(&[f.paint.slot; 16]);
@@ -334,8 +324,11 @@ fn cover_tile<S: Simd>(simd: S, target: &mut Target, f: &mut Filling<S>, tile: u
         }
     }
     if f.paint.how.hierarchical {
-        let least = (origins + f.paint.least_step).max(low).min(high);
+        let least = f.paint.clamped(simd, origins + f.paint.least_step);
         least.store_slice(&mut target.levels[0].min[tile].0);
         target.mark_stale(tile);
     }
 }
+
+#[cfg(test)]
+mod tests;

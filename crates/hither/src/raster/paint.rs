@@ -3,7 +3,8 @@
 //! A block's origin is evaluated in f64 from the plane and rounded once; pixels add `a·dx + b·dy` in f32 and are
 //! clamped to the corners' range. These operations depend on the block's place in the image only, so every path
 //! gives the same bits. The bound used to skip a block or tile is the plane's largest value there plus
-//! `plane_margin`, and never above the corners' largest depth.
+//! `plane_margin`, clamped in the same way: a pixel's centre may lie beyond a corner, as far as snapping moves that, and
+//! a steep plane is there below all that is written.
 
 use super::pyramid::{MIXED, Sixteen, Target};
 use super::setup::ScreenTriangle;
@@ -49,6 +50,13 @@ impl<S: Simd> Paint<S> {
             how,
             wrote: false,
         }
+    }
+
+    /// Depths, or bounds on them, from values of the plane: at the corners' pixels a steep plane may reach beyond the
+    /// corners themselves, on either side.
+    #[inline(always)]
+    pub fn clamped(&self, simd: S, plane: f32x16<S>) -> f32x16<S> {
+        plane.max(f32x16::splat(simd, self.depth_min)).min(f32x16::splat(simd, self.depth_max))
     }
 
     /// Whether every pixel of an empty block that the triangle covers is written.
@@ -124,9 +132,7 @@ pub(super) fn fill_block<S: Simd>(
         return false;
     }
     let at = tile * 16 + block;
-    let z = (paint.depth_steps + origin)
-        .max(f32x16::splat(simd, paint.depth_min))
-        .min(f32x16::splat(simd, paint.depth_max));
+    let z = paint.clamped(simd, paint.depth_steps + origin);
     let old = f32x16::from_slice(simd, &target.depth[at].0);
     let mut write = z.simd_gt(old).to_bitmask() as u32 & covered;
     let tied = z.simd_eq(old).to_bitmask() as u32 & covered;
