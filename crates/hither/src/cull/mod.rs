@@ -11,6 +11,7 @@
 pub mod buffer;
 mod closed;
 pub mod planes;
+mod queue;
 mod scene;
 
 pub use buffer::{

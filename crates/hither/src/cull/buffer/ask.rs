@@ -2,8 +2,8 @@
 //!
 //! *Bound.* A row's dot product in f32 with rounded coefficients differs from the exact one by at most
 //! `8·2⁻²⁴·(|r₀|·X + |r₁|·Y + |r₂|·Z + |r₃|)`, where X, Y, Z are the box's largest coordinates: four rounded
-//! coefficients, three products and three sums. It is taken for each box by itself. With errors eₓ of a
-//! numerator, e_w of W and a quotient q, a screen coordinate is off by at most
+//! coefficients, three products and three sums; what f64 lost of the constant on its way here is added. It is taken for
+//! each box by itself. With errors eₓ of a numerator, e_w of W and a quotient q, a screen coordinate is off by at most
 //! `(eₓ + |q|·e_w) / (W − e_w)` plus four roundings of q, where W is at least nine times e_w and beyond the near
 //! plane. Of a box that reaches nearer than that, or farther than f32 can tell, the quotients say nothing: it may
 //! touch every pixel, at any depth, unless it lies wholly beyond a plane through the eye and a side of the image.
@@ -31,6 +31,11 @@ pub(crate) struct BoxView {
     /// How far the eye may move, metres, and pixels that a metre covers at distance 1: what lies beyond the
     /// image's border by no more than their product over its distance may come into view.
     pub margin: [f32; 2],
+    /// What an orthographic depth changes by over so far: what lies before the near plane, or beyond the far one, by no
+    /// more than that may come into view.
+    pub depth_margin: f32,
+    /// What f64 lost of the rows' constants on the way here, pixels and units of W and of depth.
+    lost: [f32; 4],
 }
 
 /// Where sixteen boxes lie.
@@ -72,7 +77,11 @@ impl BoxView {
     pub fn new(at: &ScreenFromObject, width: u32, height: u32) -> BoxView {
         let pixels = |r: [f64; 4]| r.map(|c| (c / 256.0) as f32);
         let plain = |r: [f64; 4]| r.map(|c| c as f32);
-        let in_range = [at.x, at.y, at.w, at.d].as_flattened().iter().all(|c| c.abs() < 1e18);
+        let below = [at.x, at.y, at.w, at.d].as_flattened().iter().all(|c| c.abs() < 1e18);
+        // What is smaller than f32's normal numbers is not rounded to a share of itself.
+        let above = !at.perspective || at.w[..3].iter().any(|c| c.abs() > 1e-30);
+        let in_range = below && above;
+        let [x, y, third] = at.lost().map(|lost| (lost as f32).next_up());
         BoxView {
             in_range,
             x: pixels(at.x),
@@ -84,6 +93,8 @@ impl BoxView {
             height: height as f32,
             centres: false,
             margin: [0.0; 2],
+            depth_margin: 0.0,
+            lost: [x * (1.0 / 256.0), y * (1.0 / 256.0), third, third],
         }
     }
 }
@@ -140,7 +151,8 @@ fn project_some<S: Simd>(
 ) {
     let splat = |v: f32| S::f32s::splat(simd, v);
     let reach = reach::<S>(lo, hi);
-    let (x_error, y_error) = (error::<S>(&reach, &view.x), error::<S>(&reach, &view.y));
+    let x_error = error::<S>(&reach, &view.x, view.lost[0]);
+    let y_error = error::<S>(&reach, &view.y, view.lost[1]);
     let (mut low, mut high) = ([splat(0.0); 2], [splat(0.0); 2]);
     let (least_w, w_error, depth, farthest, clear, mut inside);
     if view.perspective {
@@ -160,7 +172,7 @@ fn project_some<S: Simd>(
                 (w_low, w_high) = (w_low.min(w), w_high.max(w));
             }
         }
-        w_error = error::<S>(&reach, &view.w);
+        w_error = error::<S>(&reach, &view.w, view.lost[2]);
         least_w = w_low - w_error;
         let near = splat(view.d[3] * 1.000_001);
         clear = least_w.simd_gt(near) & least_w.simd_gt(w_error * 8.0);
@@ -170,12 +182,15 @@ fn project_some<S: Simd>(
         farthest = near / most_w * 0.999_997;
     } else {
         let d = corners(&view.d, lo, hi);
-        let d_error = error::<S>(&reach, &view.d);
+        let d_error = error::<S>(&reach, &view.d, view.lost[3]);
         (least_w, w_error) = (splat(1.0), splat(0.0));
-        depth = largest(&d) + d_error;
-        clear = depth.simd_le(splat(1.0));
+        let most = largest(&d) + d_error;
+        clear = most.simd_le(splat(1.0));
         farthest = smallest(&d) - d_error;
-        inside = farthest.simd_le(splat(1.0)) & depth.simd_gt(splat(0.0));
+        let beyond = splat(view.depth_margin);
+        inside = farthest.simd_le(beyond + 1.0) & most.simd_gt(beyond * -1.0);
+        // What is drawn holds more than 0, and hides what lies beyond the far plane.
+        depth = most.max(splat(0.0));
         let (x, y) = (corners(&view.x, lo, hi), corners(&view.y, lo, hi));
         low = [smallest(&x), smallest(&y)];
         high = [largest(&x), largest(&y)];
@@ -245,8 +260,8 @@ fn reach<S: Simd>(lo: &[S::f32s; 3], hi: &[S::f32s; 3]) -> [S::f32s; 3] {
 
 /// What a row's products with the corners may be off by.
 #[inline(always)]
-fn error<S: Simd>(reach: &[S::f32s; 3], r: &[f32; 4]) -> S::f32s {
-    (reach[0] * r[0].abs() + reach[1] * r[1].abs() + reach[2] * r[2].abs() + r[3].abs()) * ROUNDING
+fn error<S: Simd>(reach: &[S::f32s; 3], r: &[f32; 4], lost: f32) -> S::f32s {
+    (reach[0] * r[0].abs() + reach[1] * r[1].abs() + reach[2] * r[2].abs() + r[3].abs()) * ROUNDING + lost
 }
 
 /// Coordinates beyond this, metres, could overflow on their way; such a box is seen everywhere.
@@ -277,8 +292,8 @@ fn beyond_a_side<S: Simd>(simd: S, view: &BoxView, lo: &[S::f32s; 3], hi: &[S::f
             let w = if view.perspective { corners(&view.w, lo, hi) } else { [S::f32s::splat(simd, 1.0); 8] };
             let (x, y) = (corners(&view.x, lo, hi), corners(&view.y, lo, hi));
             let reach = reach::<S>(lo, hi);
-            let w_error = error::<S>(&reach, &view.w);
-            let errors = [error::<S>(&reach, &view.x), error::<S>(&reach, &view.y)];
+            let error = |row: &[f32; 4], k: usize| error::<S>(&reach, row, view.lost[k]);
+            let (errors, w_error) = ([error(&view.x, 0), error(&view.y, 1)], error(&view.w, 2));
             let mut beyond = 0u16;
             for (p, own, size) in [(&x, errors[0], view.width), (&y, errors[1], view.height)] {
                 for (bound, sign) in [(-0.01f32, 1.0f32), (size + 0.01, -1.0)] {

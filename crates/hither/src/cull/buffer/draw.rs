@@ -1,6 +1,5 @@
 //! Drawing an occluder into a band of the image: the walk of its patches, nearest first, and each patch.
 
-use super::Drawn;
 use super::ask::{BoxView, BoxesOnScreen, project_lanes};
 use super::clip::{self, Clipped, EdgeOf, clip, doubled_area};
 use super::convex::{self, Bounds};
@@ -10,11 +9,11 @@ use super::mosaic::{Area, Drawing, Mosaic};
 use super::occluder::{ENDS, Face, Occluder, Patch};
 use super::place::{Placed, Placing, Sizes};
 use super::surface::Surface;
+use super::{Drawn, Margin};
+use crate::cull::queue::NearestFirst;
 use crate::index::{Child, Slot};
 use crate::raster::ScreenFromObject;
 use fearless_simd::Simd;
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
 
 /// Rows of the image, and what is needed to draw into them.
 #[derive(Clone, Debug)]
@@ -33,7 +32,7 @@ pub(in crate::cull) struct Band {
     bounds: Bounds,
     /// The children of a node.
     boxes: Box<BoxesOnScreen>,
-    open: BinaryHeap<Open>,
+    open: NearestFirst<Open>,
 }
 
 /// A part of an occluder's tree that may show.
@@ -45,27 +44,6 @@ struct Open {
     clear: bool,
 }
 
-impl Ord for Open {
-    /// The nearest is the greatest.
-    fn cmp(&self, o: &Open) -> Ordering {
-        self.depth.total_cmp(&o.depth)
-    }
-}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, o: &Open) -> Option<Ordering> {
-        Some(self.cmp(o))
-    }
-}
-
-impl PartialEq for Open {
-    fn eq(&self, o: &Open) -> bool {
-        self.cmp(o) == Ordering::Equal
-    }
-}
-
-impl Eq for Open {}
-
 /// An occluder in its place.
 #[derive(Clone, Copy)]
 pub(in crate::cull) struct Standing<'a> {
@@ -75,8 +53,8 @@ pub(in crate::cull) struct Standing<'a> {
     pub eye: [f32; 4],
     pub boxes: BoxView,
     pub(super) sizes: Sizes,
-    /// How far the eye may move relative to it, metres, and pixels a metre at distance 1 across the image.
-    pub margin: Option<(f64, f64)>,
+    /// How far the eye may move relative to it.
+    pub(super) margin: Option<Margin>,
     /// Columns and rows of the image.
     pub size: [i32; 2],
     /// Patches that touch fewer pixels across or down than this are not worth drawing.
@@ -105,7 +83,7 @@ impl Band {
             mosaic: Mosaic::default(),
             bounds: Bounds::default(),
             boxes: Box::new(BoxesOnScreen::NONE),
-            open: BinaryHeap::new(),
+            open: NearestFirst::new(),
         }
     }
 
@@ -183,9 +161,7 @@ impl Band {
                 Child::Node(node) => self.visit(simd, standing, node, drawn),
                 Child::Leaf(patch) => {
                     let patch = &standing.occluder.patches[patch as usize];
-                    let [left, top, right, bottom] = open.rect.map(i64::from);
-                    let pixels = (right - left + 1) * (bottom - top + 1);
-                    let Some(bodies) = bodies(standing, patch, &open, pixels) else { continue };
+                    let Some(bodies) = bodies(standing, patch, &open) else { continue };
                     simd.vectorize(
                         #[inline(always)]
                         || self.draw_patch(simd, standing, patch, open, bodies, drawn),
@@ -235,7 +211,12 @@ impl Band {
                 continue;
             }
             let open = Open { slot: node.child[lane], rect, depth: boxes.depth[lane], clear };
-            self.open.push(open);
+            if let Child::Leaf(patch) = open.slot.child()
+                && bodies(standing, &standing.occluder.patches[patch as usize], &open).is_none()
+            {
+                continue;
+            }
+            self.open.push(open, open.depth);
         }
     }
 
@@ -476,20 +457,17 @@ impl Band {
 
     /// Pixels that the patch's outline may move by under the margin; `None` if it is too near to say.
     fn margin_px(&self, standing: &Standing) -> Option<i32> {
-        let Some((metres, pixels)) = standing.margin else { return Some(0) };
-        let distance = if standing.at.perspective {
-            let near = standing.at.d[3];
-            let distance = near / (f64::from(self.placed.nearest) * 1.000_001);
-            // Nearer than that, an eye that moved towards it would have its near plane behind it.
-            if distance < near + metres {
-                return None;
-            }
-            distance
+        let Some(Margin { metres, pixels, depth }) = standing.margin else { return Some(0) };
+        let nearest = f64::from(self.placed.nearest) * 1.000_001;
+        let distance = if standing.at.perspective { standing.at.d[3] / nearest } else { 1.0 };
+        // Nearer than that, an eye that moved towards it would have its near plane behind it.
+        let too_near = if standing.at.perspective {
+            distance < standing.at.d[3] + metres
         } else {
-            1.0
+            nearest + DEPTH_IS_LESS + depth > 1.0
         };
         let reach = (metres * pixels / distance).ceil() + 1.0;
-        (reach <= 256.0).then_some(reach as i32)
+        (!too_near && reach <= 256.0).then_some(reach as i32)
     }
 
     /// Places a patch that needs no clipping and says which way its faces turn.
@@ -576,10 +554,11 @@ const FACES_OF_A_BODY_FOR_ONE: i64 = 16;
 /// Smaller boxes hide too little for what it takes to place them.
 const PX_A_FACE_OF_A_BOX: i32 = 32;
 
-/// The convex bodies as which a patch is drawn: itself, if it is one, or, if its `pixels` are few for its faces, the boxes
+/// The convex bodies as which a patch is drawn: itself, if it is one, or, if its pixels are few for its faces, the boxes
 /// inside of it. None stands for its faces; `None` for a patch that is not worth drawing.
 #[inline(always)]
-fn bodies<'a>(standing: &Standing<'a>, patch: &'a Patch, open: &Open, pixels: i64) -> Option<&'a [Patch]> {
+fn bodies<'a>(standing: &Standing<'a>, patch: &'a Patch, open: &Open) -> Option<&'a [Patch]> {
+    let pixels = area_of(open.rect);
     let wanted = i64::from(patch.faces) * i64::from(standing.px_a_face);
     // Bodies are drawn whole, beyond the near plane, and for one eye. It is outside of the bounding box, then.
     let whole = open.clear && !standing.plain && standing.margin.is_none();
@@ -609,10 +588,14 @@ fn placing_of(standing: &Standing, open: &Open) -> Option<Placing> {
     Placing::new(&standing.at, &standing.sizes, least_w)
 }
 
+/// An orthographic depth is kept no more than that below the true one, and a share of it: see [`Placing::depth`].
+const DEPTH_IS_LESS: f64 = 4e-6;
+
 /// The surface ends at every edge of a face, as far as the face knows.
 const ALL: u32 = 15;
 
 /// Pixels in a rectangle (inclusive).
+#[inline(always)]
 fn area_of([left, top, right, bottom]: [i32; 4]) -> i64 {
     i64::from(right - left + 1) * i64::from(bottom - top + 1)
 }

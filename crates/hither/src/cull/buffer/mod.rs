@@ -230,6 +230,17 @@ pub struct OcclusionBuffer {
     band: Band,
 }
 
+/// How far things and the eye may come nearer to each other, or go apart.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Margin {
+    /// Units of view space.
+    pub metres: f64,
+    /// Pixels that a unit at distance 1 covers anywhere in the image.
+    pub pixels: f64,
+    /// What an orthographic depth changes by over so far; 0 in perspective.
+    pub depth: f64,
+}
+
 /// What all bands of an image share.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
@@ -238,6 +249,8 @@ pub(super) struct Frame {
     /// What boxes are asked about.
     pub meaning: Meaning,
     pub screen_from_world: ScreenFromObject,
+    /// How far, in units of view space, what is drawn and the eye may come nearer to each other.
+    moves: f64,
     /// Pixels that a metre at distance 1 covers anywhere in the image.
     pixels_a_metre: f64,
 }
@@ -256,6 +269,7 @@ impl Frame {
             options: *options,
             meaning: Meaning::Continuous,
             screen_from_world,
+            moves: (options.eye_moves + options.objects_move) * view.stretch(),
             pixels_a_metre,
         })
     }
@@ -294,10 +308,13 @@ impl Frame {
         Ok(self)
     }
 
-    /// How far, in units of view space, what is drawn and the eye may come nearer to each other; and pixels to a unit.
-    pub(super) fn margin(&self) -> Option<(f64, f64)> {
-        let metres = (self.options.eye_moves + self.options.objects_move) * self.view.stretch();
-        (metres > 0.0).then_some((metres, self.pixels_a_metre))
+    /// How far what is drawn and the eye may come nearer to each other, if they may.
+    pub(super) fn margin(&self) -> Option<Margin> {
+        let depth = match self.view.projection {
+            Projection::Orthographic { near, far, .. } => self.moves / (far - near) * (1.0 + 1e-12),
+            Projection::Perspective { .. } => 0.0,
+        };
+        (self.moves > 0.0).then_some(Margin { metres: self.moves, pixels: self.pixels_a_metre, depth })
     }
 
     fn standing<'a>(&self, occluder: &'a Occluder, world_from_object: &DAffine3) -> Standing<'a> {

@@ -39,15 +39,17 @@ impl Sizes {
     /// For points whose coordinates are at most `reach` in magnitude.
     ///
     /// *Bound.* A dot product of three terms and a constant in f64, whose coefficients went through two
-    /// products of matrices, is off by at most 16·2⁻⁵³ of the sum of the terms' magnitudes.
+    /// products of matrices, is off by at most 16·2⁻⁵³ of the sum of the terms' magnitudes, and by what was lost of the
+    /// constant where larger numbers cancelled.
     pub fn new(at: &ScreenFromObject, reach: [f64; 3]) -> Sizes {
-        let size = |r: &[f64; 4]| {
+        let size = |r: &[f64; 4], lost: f64| {
             let terms = r[0].abs() * reach[0] + r[1].abs() * reach[1] + r[2].abs() * reach[2] + r[3].abs();
-            terms * 2f64.powi(-49)
+            terms * 2f64.powi(-49) + lost
         };
-        let w = if at.perspective { size(&at.w) } else { 0.0 };
-        let depth = if at.perspective { 0.0 } else { size(&at.d) };
-        Sizes { screen: size(&at.x).max(size(&at.y)), w, depth }
+        let [x, y, third] = at.lost();
+        let w = if at.perspective { size(&at.w, third) } else { 0.0 };
+        let depth = if at.perspective { 0.0 } else { size(&at.d, third) };
+        Sizes { screen: size(&at.x, x).max(size(&at.y, y)), w, depth }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::ask::{BoxView, BoxesOnScreen, project};
 use super::draw::Band;
-use super::{Frame, Occludee, OcclusionBuffer, PlacedMesh, Verdict};
+use super::{Frame, Margin, Occludee, OcclusionBuffer, PlacedMesh, Verdict};
 use crate::conventions::{Projection, View};
 use crate::cull::Meaning;
 use crate::geometry::Aabb;
@@ -109,8 +109,9 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// The rectangle around it on the screen and the nearest it comes; what is to be said of it where it has none.
-    pub(super) fn on_screen(&self, view: &View) -> Result<ScreenRect, Verdict> {
+    /// The rectangle around it on the screen and the nearest it comes; what is to be said of it where it has none. With a
+    /// margin it is outside only if it is so for every eye that may come.
+    pub(super) fn on_screen(&self, view: &View, margin: Option<Margin>) -> Result<ScreenRect, Verdict> {
         let c = view.view_from_world.transform_point3(self.center);
         let stretch = view.stretch();
         let size = self.center.length() * stretch + view.view_from_world.translation.abs().max_element();
@@ -120,10 +121,11 @@ impl Ball {
             return Err(Verdict::Visible);
         }
         let scale = view.pixels_per_unit();
+        let (beyond, beyond_in_depth) = margin.map_or((0.0, 0.0), |margin| (margin.metres, margin.depth));
         let (x, y, depth) = match view.projection {
             Projection::Perspective { near, .. } => {
                 let distance = -c.z;
-                if distance + radius < near {
+                if distance + radius < near - beyond {
                     return Err(Verdict::Outside);
                 }
                 if distance - radius <= near {
@@ -145,7 +147,7 @@ impl Ball {
                 let depth = (far + c.z + radius) / (far - near);
                 let tangents = |a: f64| [(a - radius) * scale, (a + radius) * scale];
                 if depth > 1.0 {
-                    let wholly = (far + c.z - radius) / (far - near) > 1.0;
+                    let wholly = (far + c.z - radius) / (far - near) > 1.0 + beyond_in_depth;
                     return Err(if wholly { Verdict::Outside } else { Verdict::Visible });
                 }
                 (tangents(c.x), tangents(-c.y), depth)
@@ -212,8 +214,9 @@ impl Frame {
     pub(in crate::cull) fn box_view(&self, screen_from_space: &ScreenFromObject) -> BoxView {
         let mut view = BoxView::new(screen_from_space, self.view.width, self.view.height);
         view.centres = self.meaning == Meaning::Sampled;
-        if let Some((metres, pixels)) = self.margin() {
+        if let Some(Margin { metres, pixels, depth }) = self.margin() {
             view.margin = [(metres as f32).next_up(), (pixels as f32).next_up()];
+            view.depth_margin = (depth as f32).next_up();
         }
         view
     }
@@ -319,7 +322,7 @@ impl Frame {
 
     pub(super) fn ask_sphere(&self, bands: &[&Band], center: DVec3, radius: f64) -> Verdict {
         let ball = Ball { center, radius: radius.abs() + self.options.objects_move * 2.0 };
-        match ball.on_screen(&self.view) {
+        match ball.on_screen(&self.view, self.margin()) {
             Ok(rect) => self.ask_rect(bands, &rect),
             Err(verdict) => verdict,
         }
@@ -331,13 +334,16 @@ impl Frame {
         if !(left <= right && top <= bottom) || depth.is_nan() {
             return Verdict::Visible;
         }
-        let moving = self.margin().is_some();
-        if moving && !(left > 0.0 && top > 0.0 && right < width && bottom < height) {
+        let margin = self.margin();
+        if margin.is_some() && !(left > 0.0 && top > 0.0 && right < width && bottom < height) {
             return Verdict::Visible;
         }
-        if right < 0.0 || bottom < 0.0 || left > width || top > height || depth <= 0.0 {
+        let beyond = f64::from(depth) <= -margin.map_or(0.0, |margin| margin.depth);
+        if right < 0.0 || bottom < 0.0 || left > width || top > height || beyond {
             return Verdict::Outside;
         }
+        // What is drawn holds more than 0, and hides what lies beyond the far plane.
+        let depth = depth.max(0.0);
         let pixel = |v: f64, size: f64| v.floor().clamp(0.0, size - 1.0) as i32;
         // A border that runs between two pixels touches both.
         let first = |v: f64, size: f64| pixel(v.ceil() - 1.0, size);

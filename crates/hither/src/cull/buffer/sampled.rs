@@ -183,7 +183,7 @@ impl SampledBuffer {
     }
 
     fn judge_ball(&self, bands: &mut [MutexGuard<Target>], ball: &Ball) -> Verdict {
-        match ball.on_screen(&self.view) {
+        match ball.on_screen(&self.view, None) {
             // As much nearer as the rasteriser's rounding could make it.
             Ok(rect) => self.judge_rect(bands, &ScreenRect { depth: rect.depth * 1.000_001, ..rect }),
             Err(verdict) => verdict,

@@ -456,7 +456,7 @@ fn walls_among_patches_give_the_same_in_any_order() {
         for way in 0..3 {
             // Eroded, too, by a few pixels.
             let change = |standing: &mut Standing| match way {
-                2 => standing.margin = Some((0.02, 100.0)),
+                2 => standing.margin = Some(Margin { metres: 0.02, pixels: 100.0, depth: 0.002 }),
                 _ => standing.plain = way == 1,
             };
             let depths = drawn_as(&scene, &view, change).depths();

@@ -114,7 +114,7 @@ fn the_rectangle_of_a_ball_touches_it() {
         let radius = if random.one_in(2) { distance - 1 } else { random.below(distance) };
         let [a, b] = [(); 2].map(|()| random.below(16384) as i32 - 8192);
         let center = DVec3::new(f64::from(a), f64::from(b), -f64::from(distance));
-        let rect = Ball { center, radius: f64::from(radius) }.on_screen(&view).unwrap();
+        let rect = Ball { center, radius: f64::from(radius) }.on_screen(&view, None).unwrap();
         let sides = [
             (a, rect.left, 500.0, 1.0),
             (a, rect.right, 500.0, -1.0),

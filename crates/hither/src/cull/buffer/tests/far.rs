@@ -169,3 +169,27 @@ fn no_pixel_holds_more_than_is_there_where_surfaces_are_no_manifolds() {
     let (covered, shot) = attack_all(1200, tangle, 5, 21);
     assert!(covered > 100_000 && shot > 500_000, "{covered} pixels, {shot} rays");
 }
+
+#[test]
+fn nothing_drawn_hides_nothing_in_a_view_of_any_scale() {
+    let random = &mut Random::new(12);
+    let mut seen = 0;
+    for exponent in -50..=24 {
+        let scale = 10f64.powi(exponent);
+        let mut view = some_eye(random, 0.0);
+        let Projection::Perspective { fov_y, near } = view.projection else { continue };
+        view.projection = Projection::Perspective { fov_y, near: near * scale };
+        view.view_from_world = DAffine3::from_scale(DVec3::splat(scale)) * view.view_from_world;
+        let Ok(buffer) = OcclusionBuffer::new(&view, &OcclusionOptions::default()) else { continue };
+        for _ in 0..400 {
+            let b = near_the_eye(random, &view);
+            let middle = b.center();
+            let b = if random.one_in(4) { b } else { Aabb { min: middle, max: middle } };
+            if is_in_view(&view, &b, random) {
+                assert_eq!(buffer.ask_box(&b), Verdict::Visible, "{b:?} at a scale of {scale}");
+                seen += 1;
+            }
+        }
+    }
+    assert!(seen > 2000, "{seen}");
+}

@@ -63,3 +63,68 @@ fn crosses(eye: DVec3, point: DVec3, half: DVec3) -> bool {
     let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
     enter <= leave && leave >= 0.0 && enter <= 1.0
 }
+
+/// Whether an eye that looks along −z sees a point: beyond its near plane and before its far one, in the picture, and
+/// not behind a square that stands across its axis, as far as that is in view itself.
+fn sees(view: &View, eye: DVec3, point: DVec3, square: Option<(DVec3, f64)>) -> bool {
+    let way = point - eye;
+    let half = DVec3::new(f64::from(view.width), f64::from(view.height), 0.0) * 0.5 / view.pixels_per_unit();
+    let (near, far, on_image) = match view.projection {
+        Projection::Perspective { near, .. } => (near, f64::INFINITY, way / -way.z),
+        Projection::Orthographic { near, far, .. } => (near, far, way),
+    };
+    let in_view = -way.z > near && -way.z < far && on_image.x.abs() < half.x && on_image.y.abs() < half.y;
+    let hidden = square.is_some_and(|(center, side)| {
+        let before = eye.z - center.z;
+        let crossing = match view.projection {
+            Projection::Perspective { .. } => eye + way * (before / -way.z),
+            Projection::Orthographic { .. } => point,
+        };
+        let off = (crossing - center).abs();
+        before >= near && before < -way.z && off.x <= side * 0.5 && off.y <= side * 0.5
+    });
+    in_view && !hidden
+}
+
+#[test]
+fn what_lies_about_the_near_and_the_far_plane_is_asked_about_for_every_eye() {
+    let random = &mut Random::new(67);
+    let (corners, faces) = ([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)], [[0, 1, 2], [0, 2, 3]]);
+    let corners = corners.map(|(x, y)| Vec3::new(x, y, 0.0));
+    let square = Occluder::new(&corners, &faces, Sides::Both).unwrap();
+    let (mut outside, mut hidden) = (0, 0);
+    for round in 0..300 {
+        let projection = match round % 2 {
+            0 => Projection::Perspective { fov_y: 2.2, near: 1.0 },
+            _ => Projection::Orthographic { half_height: 4.0, near: 1.0, far: 10.0 },
+        };
+        let view = View::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, (64, 64));
+        let (r, m) =
+            (random.between(0.0, 0.6), if random.one_in(2) { random.between(0.0, 0.3) } else { 0.0 });
+        let options = OcclusionOptions { eye_moves: r, objects_move: m, ..OcclusionOptions::default() };
+        let mut buffer = OcclusionBuffer::new(&view, &options).unwrap();
+        let wall = (DVec3::new(0.0, 0.0, -random.between(0.5, 3.0)), 9.0);
+        buffer.draw(
+            &square,
+            &DAffine3::from_scale_rotation_translation(DVec3::splat(wall.1), DQuat::IDENTITY, wall.0),
+        );
+        for _ in 0..60 {
+            let z = if random.one_in(2) { random.between(0.0, 2.0) } else { random.between(2.0, 11.0) };
+            let at = DVec3::new(random.between(-4.0, 4.0), random.between(-4.0, 4.0), -z);
+            let half = random.between(0.0, 0.2);
+            let verdicts = [buffer.ask_box(&cube_at(at, half)), buffer.ask_sphere(at, half)];
+            outside += verdicts.iter().filter(|v| **v == Verdict::Outside).count();
+            hidden += verdicts.iter().filter(|v| **v == Verdict::Hidden).count();
+            for _ in 0..20 {
+                let (eye, point) = (step(random, r), at + step(random, m) + step(random, half));
+                let wall = (wall.0 + step(random, m), wall.1);
+                let seen = sees(&view, eye, point, Some(wall));
+                assert!(
+                    !seen || verdicts == [Verdict::Visible; 2],
+                    "round {round}: from {eye} the point {point} is seen beside {wall:?}, but {verdicts:?}"
+                );
+            }
+        }
+    }
+    assert!(outside > 500 && hidden > 500, "{outside}, {hidden}");
+}
