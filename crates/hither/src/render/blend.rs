@@ -31,11 +31,49 @@ pub struct Fragment {
 }
 
 impl Fragment {
-    fn is_before(&self, frame: &Frame) -> bool {
-        let (x, y) = (self.pixel % frame.view.width, self.pixel / frame.view.width);
-        let opaque = frame.depth(x, y);
-        self.depth > opaque || (self.depth == opaque && frame.id(x, y).is_some_and(|id| self.id < id))
+    fn place(&self, view: &View) -> (u32, u32) {
+        (self.pixel % view.width, self.pixel / view.width)
     }
+
+    /// Whether it may be before what is opaque, as far as the frame's depth can tell.
+    fn may_be_before(&self, frame: &Frame) -> bool {
+        let (x, y) = self.place(&frame.view);
+        self.depth > frame.depth(x, y) * (1.0 - ABOUT)
+    }
+
+    /// The opaque surface, where that is about as near.
+    fn beside(&self, frame: &Frame) -> Option<SurfaceId> {
+        let (x, y) = self.place(&frame.view);
+        frame.id(x, y).filter(|_| self.depth < frame.depth(x, y) * (1.0 + ABOUT))
+    }
+}
+
+/// Depths that differ by a larger share are not those of one place. The frame's are found by other operations than
+/// fragments', in f32: where they are closer, the opaque surface's is found anew, as fragments' are, so that a tie is one.
+const ABOUT: f32 = 1e-3;
+
+/// Leaves those that are before what is opaque: nearer, or as near and with a smaller id.
+fn retain_what_is_before(
+    found: &mut Vec<Fragment>,
+    setting: &Setting,
+    frame: &Frame,
+    instances: &PlacedInstances,
+) {
+    let mut last: Option<(SurfaceId, TriangleInView)> = None;
+    found.retain(|f| {
+        let Some(id) = f.beside(frame) else { return true };
+        let (x, y) = f.place(&frame.view);
+        let in_view = match &last {
+            Some((of, in_view)) if *of == id => in_view,
+            _ => {
+                let corners = instances.get(id.instance).corners(setting.scene, id.triangle);
+                &last.insert((id, TriangleInView::new(&setting.rays, corners))).1
+            }
+        };
+        let distance = in_view.distance(in_view.weights(pixel_centre(x, y)));
+        let opaque = depth_at(&frame.view.projection, distance).unwrap_or_else(|| frame.depth(x, y));
+        f.depth > opaque || f.depth == opaque && f.id < id
+    });
 }
 
 /// A fragment with its colour: linear RGBA, straight alpha.
@@ -60,12 +98,13 @@ pub(super) fn composite(
     image.pixels.par_chunks_mut(rows * width).enumerate().for_each(|(band, pixels)| {
         let first = band * rows;
         let mut found = fragments(first as u32..(first + pixels.len() / width) as u32);
-        found.retain(|f| f.is_before(frame));
+        found.retain(|f| f.may_be_before(frame));
+        let ids = found.iter().flat_map(|f| [Some(f.id), f.beside(frame)]).flatten();
+        let instances = PlacedInstances::look_up(instances_among(ids), setting.scene, locator, view);
+        retain_what_is_before(&mut found, setting, frame, &instances);
         if found.is_empty() {
             return;
         }
-        let numbers = instances_among(found.iter().map(|f| f.id));
-        let instances = PlacedInstances::look_up(numbers, setting.scene, locator, view);
         let mut shaded = shade_fragments(found, setting, &instances, |f| {
             pixel_centre(f.pixel % view.width, f.pixel / view.width)
         });

@@ -56,6 +56,31 @@ fn layers_tint_in_the_order_of_their_depth() {
 }
 
 #[test]
+fn panes_where_an_opaque_surface_is_go_by_their_ids_at_every_pixel() {
+    let materials =
+        || vec![glass(1.0, 0.0, 0.0, 0.5), colored(Vec4::new(0.0, 0.0, 1.0, 1.0), AlphaMode::Opaque)];
+    for turn in 0..20 {
+        let (eye, target) = (DVec3::new(f64::from(turn) * 0.3 - 2.0, 1.1, 4.0), DVec3::new(0.1, 0.2, 0.0));
+        let projection = match turn % 3 {
+            0 => Projection::Orthographic { half_height: 2.5, near: 0.5, far: 20.0 },
+            _ => Projection::Perspective { fov_y: 0.9, near: 0.1 },
+        };
+        let view = View::look_at(eye, target, DVec3::Y, projection, (96, 72));
+        for [first, second] in [[0, 1], [1, 0]] {
+            let nodes = [first, second].map(|k| (square(Some(k)), at(0.0, 0.0, 0.0)));
+            let image = picture(&scene(materials(), nodes.to_vec()), &view);
+            let (mut tinted, mut plain) = (0, 0);
+            for [red, _, blue, _] in image.pixels.iter().filter(|p| p[3] == 1.0) {
+                (tinted, plain) =
+                    (tinted + u32::from(*red > 0.0), plain + u32::from(*red == 0.0 && *blue > 0.0));
+            }
+            let (expected, other) = if first == 0 { (tinted, plain) } else { (plain, tinted) };
+            assert!(expected > 100 && other == 0, "turn {turn}, {first} first: {tinted} tinted, {plain} not");
+        }
+    }
+}
+
+#[test]
 fn over_nothing_a_pane_is_translucent_and_premultiplied() {
     let scene = scene(vec![glass(1.0, 0.0, 1.0, 0.5)], vec![(square(Some(0)), at(0.0, 0.0, 0.0))]);
     let image = picture(&scene, &front_view());
