@@ -68,7 +68,13 @@ impl Eye {
             Eye::Fixed(view)
         };
         // A size or a pose that cannot be drawn is refused here, before any work.
-        eye.view(scene, source, options.size)?;
+        let view = eye.view(scene, source, options.size)?;
+        if let (Some((index, _)), Some(step)) = (eye.camera_name(scene), coarse_depth(&view.projection)) {
+            verbosity.warning(&format!(
+                "{source}: camera {index}: its planes are so far apart that depths within {step:.1e} m are one; \
+                 hidden surfaces may show; bring its zfar nearer"
+            ));
+        }
         Ok(eye)
     }
 
@@ -122,6 +128,16 @@ fn unknown_camera(scene: &Scene, source: &str, name: &str) -> Failure {
     };
     Failure::work(format!("{source}: no camera \"{name}\"; {remedy}"))
 }
+
+/// By how much orthographic depths, f32 numbers up to 1, can differ and be one, metres; if that is a visible distance.
+fn coarse_depth(projection: &Projection) -> Option<f64> {
+    let Projection::Orthographic { half_height, near, far } = *projection else { return None };
+    let step = (far - near) * f64::from(f32::EPSILON) * 0.5;
+    (step > half_height * VISIBLE).then_some(step)
+}
+
+/// What share of half a picture's height can be seen.
+const VISIBLE: f64 = 1e-3;
 
 /// Refuses a scene whose squared size f64 cannot hold.
 fn check_can_be_framed(bounds: Option<Aabb>, source: &str) -> Result<(), Failure> {

@@ -15,6 +15,7 @@ pub struct Timeline {
     pub numbered: bool,
     clock: Clock,
     animation: Option<usize>,
+    source: String,
 }
 
 /// When a picture is.
@@ -51,7 +52,8 @@ impl Timeline {
             verbosity.warning(&format!("{source}: the scene has no animation; it stands still"));
         }
         let numbered = options.frames.is_some();
-        Ok(Timeline { frames: options.frames.clone().unwrap_or(0..1), numbered, clock, animation })
+        let frames = options.frames.clone().unwrap_or(0..1);
+        Ok(Timeline { frames, numbered, clock, animation, source: source.to_owned() })
     }
 
     /// Time of picture `frame` in the scene's animation, seconds; `None`: as the scene is stored.
@@ -64,22 +66,36 @@ impl Timeline {
     }
 
     /// Poses an index for one of the pictures.
-    pub fn pose(&self, index: &mut SceneIndex, frame: u32) {
+    pub fn pose(&self, index: &mut SceneIndex, frame: u32) -> Result<(), Failure> {
         if let (Some(animation), Some(time)) = (self.animation, self.time(frame)) {
             index.pose(animation, time);
+            self.check_places(index.scene(), time)?;
         }
+        Ok(())
     }
 
     /// Poses a scene that is not indexed yet for the first picture.
-    pub fn pose_first(&self, scene: &mut Scene) {
-        self.pose_scene(scene, self.frames.start);
+    pub fn pose_first(&self, scene: &mut Scene) -> Result<(), Failure> {
+        self.pose_scene(scene, self.frames.start)
     }
 
     /// Poses a scene that is not indexed for one of the pictures.
-    pub fn pose_scene(&self, scene: &mut Scene, frame: u32) {
+    pub fn pose_scene(&self, scene: &mut Scene, frame: u32) -> Result<(), Failure> {
         if let (Some(animation), Some(time)) = (self.animation, self.time(frame)) {
             scene.pose(animation, time);
+            self.check_places(scene, time)?;
         }
+        Ok(())
+    }
+
+    /// Refuses places that are beyond all numbers, which scales on the way there can lead to.
+    fn check_places(&self, scene: &Scene, time: f64) -> Result<(), Failure> {
+        let group = scene.root_group();
+        let Some(lost) = group.world_transforms().iter().position(|w| !w.is_finite()) else { return Ok(()) };
+        Err(Failure::work(format!(
+            "{}: node {lost} \"{}\": at {time} s its place in the world is not a finite number; choose another time",
+            self.source, group.nodes[lost].name
+        )))
     }
 }
 

@@ -93,7 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         planes::check_scene(&scene, &arguments.scene)?;
     }
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
-    timeline.pose_first(&mut scene);
+    timeline.pose_first(&mut scene)?;
     let eye = Eye::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     let spinner = verbosity.spinner("indexing".into());
     let mut index = SceneIndex::build(scene, &IndexOptions::default());
@@ -103,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut frames = Vec::new();
     let bar = verbosity.bar(timeline.frames.len() as u64, "frames");
     for number in timeline.frames.clone() {
-        timeline.pose(&mut index, number);
+        timeline.pose(&mut index, number)?;
         let view = eye.view(index.scene(), &arguments.scene, arguments.view.size)?;
         let found = method.find(&index, &view)?;
         if let Method::Planes(planes) = &method {

@@ -107,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
     let prepared = arguments.parts.prepare(&mut scene, &arguments.scene)?;
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
-    timeline.pose_scene(&mut scene, timeline.frames.start);
+    timeline.pose_scene(&mut scene, timeline.frames.start)?;
     let eye = Eye::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     let view = eye.view(&scene, &arguments.scene, arguments.view.size)?;
     // Corners are rounded to 1/256 pixel, and depth to single precision.
@@ -125,7 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut reuse = arguments.reuse.map(Reuse::new).transpose()?;
     let mut frames = Vec::new();
     for number in timeline.frames.clone() {
-        timeline.pose_scene(&mut scene, number);
+        timeline.pose_scene(&mut scene, number)?;
         painter.pose(&scene);
         let view = eye.view(&scene, &arguments.scene, arguments.view.size)?;
         let taken = take_apart(arguments, &scene, &view, &mut sorting, &mut painter, &paint, &replacements)?;

@@ -56,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let prepared = arguments.parts.prepare(&mut scene, &arguments.scene)?;
     let read_time = start.elapsed();
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
-    timeline.pose_scene(&mut scene, timeline.frames.start);
+    timeline.pose_scene(&mut scene, timeline.frames.start)?;
     let eye = Eye::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     let start = Instant::now();
     let options = SortOptions { incremental: !arguments.from_scratch, ..SortOptions::default() };
@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let mut frames = Vec::new();
     for number in timeline.frames.clone() {
-        timeline.pose_scene(&mut scene, number);
+        timeline.pose_scene(&mut scene, number)?;
         let view = eye.view(&scene, &arguments.scene, arguments.view.size)?;
         let time = sorting.sort(&scene, &view);
         let order = sorting.sort.order().clone();

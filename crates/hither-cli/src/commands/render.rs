@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
     let read_time = start.elapsed();
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
-    timeline.pose_first(&mut scene);
+    timeline.pose_first(&mut scene)?;
     let eye = Eye::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
 
     let spinner = verbosity.spinner("indexing".into());
@@ -103,7 +103,7 @@ impl Job<'_> {
         let mut reports = Vec::new();
         let bar = verbosity.bar(self.timeline.frames.len() as u64, "pictures");
         for number in self.timeline.frames.clone() {
-            self.timeline.pose(index, number);
+            self.timeline.pose(index, number)?;
             let view = self.eye.view(index.scene(), &self.arguments.scene, self.arguments.view.size)?;
             let start = Instant::now();
             let frame = renderer.render(index, &view, &options).map_err(|e| Failure::work(e.to_string()))?;

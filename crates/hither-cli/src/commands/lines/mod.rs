@@ -36,7 +36,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_size(&scene, &arguments.scene)?;
     let read_time = start.elapsed();
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
-    timeline.pose_first(&mut scene);
+    timeline.pose_first(&mut scene)?;
     let mut paper = Paper::choose(&scene, arguments, verbosity)?;
 
     let spinner = verbosity.spinner("preparing".into());
@@ -51,7 +51,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut frames = Vec::new();
     for number in timeline.frames.clone() {
         if number != timeline.frames.start {
-            timeline.pose_scene(&mut scene, number);
+            timeline.pose_scene(&mut scene, number)?;
             preparation.pose(&scene);
             paper.follow(&scene, &arguments.scene)?;
         }
