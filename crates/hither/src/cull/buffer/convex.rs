@@ -280,8 +280,8 @@ fn planes(drawing: &Drawing, faces: u32) -> Seen {
 #[inline(always)]
 fn fill<S: Simd>(simd: S, surface: &mut Surface, bounds: &Bounds, seen: &Seen, rect: [i32; 4]) {
     let [first, top, last, bottom] = rect;
-    for cell_y in top >> 6..=bottom >> 6 {
-        for cell_x in first >> 6..=last >> 6 {
+    for cell_y in top >> 6..(bottom >> 6) + 1 {
+        for cell_x in first >> 6..(last >> 6) + 1 {
             let mut open = surface.tiles_beyond(simd, cell_x, cell_y, rect, seen.nearest);
             while open != 0 {
                 let tile_row = open.trailing_zeros() as i32 >> 2;

@@ -482,9 +482,9 @@ fn fill_small<S: Simd, const N: usize>(
     for k in 0..N {
         (edges[k], at_first[k]) = face.edge_nearby(k, x0 & !15, y0);
     }
-    for tile_x in x0 >> 4..=x1 >> 4 {
+    for tile_x in x0 >> 4..(x1 >> 4) + 1 {
         let x = tile_x * 16;
-        for tile_y in y0 >> 4..=y1 >> 4 {
+        for tile_y in y0 >> 4..(y1 >> 4) + 1 {
             let tile = surface.tile(tile_x, tile_y);
             let within = face.within(x, tile_y * 16);
             if goes != Goes::Jointly && !surface.may_gain(simd, tile, within, face.patch_nearest) {
@@ -587,7 +587,7 @@ fn into_joint<S: Simd, const N: usize>(
     let touched = touched & around;
     let old = f32x16::from_slice(simd, &joint.depth.0);
     touched.select(old.min(place.depth(simd, face, plane)), old).store_slice(&mut joint.depth.0);
-    for y in place.rows[0]..=place.rows[1] {
+    for y in place.rows[0]..(place.rows[1]) + 1 {
         let mut centre = zero;
         for e in &e {
             centre |= *e;
@@ -645,9 +645,9 @@ fn fill_tiles<S: Simd>(simd: S, surface: &mut Surface, joint: &mut Joint, face: 
         down[k] = i64::from(edge.a.min(0) + edge.b.min(0)) * 15 - i64::from(edge.inside);
         edges[k] = edge;
     }
-    for tile_y in top..=bottom {
+    for tile_y in top..bottom + 1 {
         let mut was_inside = false;
-        for tile_x in left..=right {
+        for tile_x in left..right + 1 {
             let (x, y) = (tile_x * 16, tile_y * 16);
             let tile = surface.tile(tile_x, tile_y);
             let mut crossed = Crossed { tile, x, y, numbers: [0; 4], count: 0, shared: false };

@@ -398,8 +398,8 @@ pub(super) fn fill_one<S: Simd>(simd: S, surface: &mut Surface, faces: &Sixteen,
     }
     let plane = [faces.plane[0][lane], faces.plane[1][lane], faces.plane[2][lane]];
     let nearest = faces.nearest[lane];
-    for cell_y in top >> 6..=bottom >> 6 {
-        for cell_x in first >> 6..=last >> 6 {
+    for cell_y in top >> 6..(bottom >> 6) + 1 {
+        for cell_x in first >> 6..(last >> 6) + 1 {
             let mut open = surface.tiles_beyond(simd, cell_x, cell_y, [first, top, last, bottom], nearest);
             while open != 0 {
                 let tile_row = open.trailing_zeros() as i32 >> 2;

@@ -239,7 +239,7 @@ impl Mosaic {
         let (first_f, last_f) = (f64::from(first_row), f64::from(last_row));
         if dx == 0 {
             // No crossings; a column is touched or not.
-            for x in first..=last {
+            for x in first..last + 1 {
                 let e = c - i64::from(dy) * i64::from(x);
                 if e >= least && e <= most && first_row <= last_row {
                     let at = ((x - area.left) >> 4) as usize * stride;
@@ -343,10 +343,10 @@ impl Mosaic {
         let nothing = i32x16::splat(simd, NO_DEPTH);
         let plane = if small { [0.0; 3] } else { plane_of([a, b, c, d], four, area.slack) };
         let farthest = i32x16::splat(simd, farthest[2]);
-        for sixteen in x0 >> 4..=x1 >> 4 {
+        for sixteen in x0 >> 4..(x1 >> 4) + 1 {
             let x = sixteen * 16;
             let above = ((x - area.left) >> 4) as usize * area.tiles;
-            for tile in y0 >> 4..=y1 >> 4 {
+            for tile in y0 >> 4..(y1 >> 4) + 1 {
                 let y = tile * 16;
                 let within = [(x0 - x).max(0), (y0 - y).max(0), (x1 - x).min(15), (y1 - y).min(15)];
                 let blocks = mask32x16::from_bitmask(simd, u64::from(blocks_in(within.map(|px| px >> 2))));
@@ -368,7 +368,7 @@ impl Mosaic {
     fn finish<S: Simd>(&mut self, simd: S, surface: &mut Surface, area: &Area, nearest: f32) {
         let (zero, nothing) = (i16x16::splat(simd, 0), i32x16::splat(simd, NO_DEPTH));
         let highest = i32x16::splat(simd, nearest.to_bits().cast_signed());
-        for sixteen in area.left >> 4..=area.rect[2] >> 4 {
+        for sixteen in area.left >> 4..(area.rect[2] >> 4) + 1 {
             let at = ((sixteen * 16 - area.left) >> 4) as usize;
             let steps = &mut self.step[at * area.stride()..][..area.stride()];
             let mut count = zero;

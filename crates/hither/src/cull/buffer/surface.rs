@@ -494,24 +494,36 @@ impl Surface {
     #[inline(always)]
     pub fn all_nearer_now<S: Simd>(&mut self, simd: S, rect: [i32; 4], depth: f32) -> bool {
         let [left, top, right, bottom] = rect;
-        for y in top >> 6..=bottom >> 6 {
-            for x in left >> 6..=right >> 6 {
+        if (right >> 4) - (left >> 4) <= 1 && (bottom >> 4) - (top >> 4) <= 1 {
+            return self.tiles_are_nearer_now(simd, rect, depth);
+        }
+        for y in top >> 6..(bottom >> 6) + 1 {
+            for x in left >> 6..(right >> 6) + 1 {
                 if self.cell_min(x, y) > depth {
                     continue;
                 }
                 let inner =
                     [left.max(x * 64), top.max(y * 64), right.min(x * 64 + 63), bottom.min(y * 64 + 63)];
-                for tile_y in inner[1] >> 4..=inner[3] >> 4 {
-                    for tile_x in inner[0] >> 4..=inner[2] >> 4 {
-                        let tile = self.tile(tile_x, tile_y);
-                        if self.tile_min(tile) > depth {
-                            continue;
-                        }
-                        self.refresh_tile(simd, tile);
-                        if !self.tile_is_nearer(simd, tile, [tile_x, tile_y], inner, depth) {
-                            return false;
-                        }
-                    }
+                if !self.tiles_are_nearer_now(simd, inner, depth) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn tiles_are_nearer_now<S: Simd>(&mut self, simd: S, rect: [i32; 4], depth: f32) -> bool {
+        let [left, top, right, bottom] = rect;
+        for y in top >> 4..(bottom >> 4) + 1 {
+            for x in left >> 4..(right >> 4) + 1 {
+                let tile = self.tile(x, y);
+                if self.tile_min(tile) > depth {
+                    continue;
+                }
+                self.refresh_tile(simd, tile);
+                if !self.tile_is_nearer(simd, tile, [x, y], rect, depth) {
+                    return false;
                 }
             }
         }
@@ -535,8 +547,8 @@ impl Surface {
         if (right >> 4) - (left >> 4) <= 1 && (bottom >> 4) - (top >> 4) <= 1 {
             return self.tiles_are_nearer(simd, rect, depth);
         }
-        for y in top >> 6..=bottom >> 6 {
-            for x in left >> 6..=right >> 6 {
+        for y in top >> 6..(bottom >> 6) + 1 {
+            for x in left >> 6..(right >> 6) + 1 {
                 if self.cell_min(x, y) > depth {
                     continue;
                 }
@@ -553,8 +565,8 @@ impl Surface {
     /// Whether nothing in the tiles that a rectangle (inclusive) meets is as near as `depth`.
     #[inline(always)]
     pub fn is_behind(&self, [left, top, right, bottom]: [i32; 4], depth: f32) -> bool {
-        for y in top >> 4..=bottom >> 4 {
-            for x in left >> 4..=right >> 4 {
+        for y in top >> 4..(bottom >> 4) + 1 {
+            for x in left >> 4..(right >> 4) + 1 {
                 if self.max[self.tile(x, y)] >= depth {
                     return false;
                 }
@@ -566,8 +578,8 @@ impl Surface {
     #[inline(always)]
     fn tiles_are_nearer<S: Simd>(&self, simd: S, rect: [i32; 4], depth: f32) -> bool {
         let [left, top, right, bottom] = rect;
-        for y in top >> 4..=bottom >> 4 {
-            for x in left >> 4..=right >> 4 {
+        for y in top >> 4..(bottom >> 4) + 1 {
+            for x in left >> 4..(right >> 4) + 1 {
                 let tile = self.tile(x, y);
                 if !self.tile_is_nearer(simd, tile, [x, y], rect, depth) {
                     return false;
@@ -617,7 +629,7 @@ impl Surface {
             return false;
         }
         let columns = (0xFFFFu32 << x0) & (0xFFFF >> (15 - x1));
-        for y in y0..=y1 {
+        for y in y0..y1 + 1 {
             let columns = columns & columns_of(open >> (y & 12));
             if columns == 0 {
                 continue;

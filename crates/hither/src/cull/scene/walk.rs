@@ -2,11 +2,12 @@
 
 use super::{Before, CullCounters, CullOptions, Culling, Hid, Judged, Reason};
 use crate::cull::buffer::{Band, BoxView, BoxesOnScreen, Drawn, Frame, Occluder, project_lanes};
+use crate::cull::queue::NearestFirst;
 use crate::index::{Child, GroupIndex, Item, SceneIndex, Slot, WideNode};
 use crate::raster::ScreenFromObject;
 use crate::scene::Content;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
-use std::collections::{BinaryHeap, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 /// A mesh's box of so many pixels is worth one more question about the boxes inside.
@@ -74,30 +75,6 @@ struct Small {
     lanes: u16,
 }
 
-/// What is to be looked at, the nearest first; of what is equally near, what was found first.
-#[derive(Default)]
-struct Queue {
-    /// The bits of a depth above the complement of a place in `found`: small, as they are moved about a lot.
-    order: BinaryHeap<u64>,
-    found: Vec<Open>,
-}
-
-impl Queue {
-    #[inline(always)]
-    fn push(&mut self, open: Open) {
-        // Depths that are 0 or more are ordered as their bits are.
-        let key = u64::from(open.nearest.to_bits()) << 32 | u64::from(!(self.found.len() as u32));
-        self.order.push(key);
-        self.found.push(open);
-    }
-
-    #[inline(always)]
-    fn pop(&mut self) -> Option<Open> {
-        let place = !(self.order.pop()? as u32);
-        Some(self.found[place as usize])
-    }
-}
-
 /// An instance that may be seen, as far as is known before everything is drawn.
 struct Seen {
     instance: u32,
@@ -139,20 +116,21 @@ struct Walk<'a> {
     band: &'a mut Band,
     contexts: Vec<Context<'a>>,
     /// What may hold an occluder.
-    queue: Queue,
+    queue: NearestFirst<Open>,
     /// What is too small for that, in no order. Looked at when everything is drawn.
     aside: Vec<Small>,
     /// Nodes whose children are to be looked at before anything else, the last first.
     entered: Vec<Place>,
-    /// Where the boxes of such a node are, and those of a node of a mesh's tree.
+    /// Where the boxes of such a node are.
     boxes: BoxesOnScreen,
-    part_boxes: BoxesOnScreen,
+    /// The same of the nodes in `parts`.
+    part_boxes: Vec<BoxesOnScreen>,
     everything_is_drawn: bool,
     seen: Vec<Seen>,
     /// Instances that may be seen, below the complement of the bits of their depth.
     visible: Vec<u64>,
-    /// Nodes of a mesh's tree to look at.
-    stack: Vec<u32>,
+    /// Nodes of a mesh's tree being looked at, each below the one before it.
+    parts: Vec<Part>,
     /// Occluders drawn before the walk.
     drawn: HashSet<u32>,
     idle: &'a HashMap<u32, u32>,
@@ -181,15 +159,15 @@ pub(super) fn cull<S: Simd>(
         least: Thresholds::new(options),
         band,
         contexts: Vec::new(),
-        queue: Queue::default(),
+        queue: NearestFirst::new(),
         aside: Vec::new(),
         entered: Vec::new(),
         boxes: BoxesOnScreen::NONE,
-        part_boxes: BoxesOnScreen::NONE,
+        part_boxes: Vec::new(),
         everything_is_drawn: false,
         seen: Vec::new(),
         visible: Vec::new(),
-        stack: Vec::new(),
+        parts: Vec::new(),
         drawn: HashSet::new(),
         idle: before.idle,
         hid,
@@ -380,7 +358,8 @@ impl<'a> Walk<'a> {
         }
         for lane in bits(inside & !lanes) {
             if node.child[lane] != Slot::EMPTY {
-                self.queue.push(Open::new(place, node.child[lane], &self.boxes, lane));
+                let open = Open::new(place, node.child[lane], &self.boxes, lane);
+                self.queue.push(open, open.nearest);
             }
         }
     }
@@ -475,8 +454,9 @@ impl<'a> Walk<'a> {
         self.counters.occluder_faces += drawn.faces;
     }
 
-    /// Whether one of the boxes in a mesh's trees shows, nearest first, down to its blocks of triangles, as long
-    /// as there are not too many to ask about. `pixels` are those of the box around it.
+    /// Whether one of the boxes in a mesh's trees shows, down to its blocks of triangles, as long as there are not too
+    /// many to ask about. `pixels` are those of the box around it. Blocks come first, for one that shows ends it; then the
+    /// nearest node, which is opened at once if it shows: often what is in it shows as well.
     #[inline(always)]
     fn mesh_shows<S: Simd>(&mut self, simd: S, mesh: u32, at: &ScreenFromObject, pixels: u32) -> Shows {
         let mesh = &self.index.meshes[mesh as usize];
@@ -488,92 +468,98 @@ impl<'a> Walk<'a> {
             if tree.nodes.is_empty() {
                 continue;
             }
-            self.stack.clear();
-            self.stack.push(0);
-            while let Some(node) = self.stack.pop() {
-                match self.node_shows(simd, &tree.nodes[node as usize], &view, at, &mut inside) {
-                    Some(reason) => return Shows::Yes(reason),
-                    None => left = left.saturating_sub(tree.nodes[node as usize].used),
+            self.parts.clear();
+            self.parts.push(Part::new(0));
+            left = left.saturating_sub(tree.nodes[0].used);
+            while let Some((slot, lane)) = self.next_part(simd, &tree.nodes, &view, at) {
+                inside = true;
+                if let Some(reason) = self.part_is_certain(&view, lane) {
+                    return Shows::Yes(reason);
                 }
-                if left == 0 && !self.stack.is_empty() {
+                if self.part_is_hidden(simd, lane) {
+                    continue;
+                }
+                let Child::Node(child) = slot.child() else { return Shows::Yes(Reason::Shows) };
+                if left == 0 {
                     return Shows::Yes(Reason::Shows);
                 }
+                left = left.saturating_sub(tree.nodes[child as usize].used);
+                self.parts.push(Part::new(child));
             }
         }
         Shows::No(if inside { Reason::PartsHidden } else { Reason::OutsideView })
     }
 
-    /// Why a node of a mesh's tree shows for certain, as far as boxes can say; its children that may show, but have
-    /// children themselves, go onto the stack, the nearest last. By eights: often one of the first shows.
+    /// A child that was not looked at yet of the node that was opened last, or else of one before it: a block, or the
+    /// nearest. Its box is that lane's of the last node. By eights: often one of the first shows.
     #[inline(always)]
-    fn node_shows<S: Simd>(
+    fn next_part<S: Simd>(
         &mut self,
         simd: S,
-        node: &WideNode,
+        nodes: &[WideNode],
         view: &BoxView,
         at: &ScreenFromObject,
-        inside: &mut bool,
-    ) -> Option<Reason> {
-        let moved = widened(self.frame, node, at);
-        let sides = moved.as_ref().map_or([&node.min, &node.max], |[min, max]| [min, max]);
-        let mut order = Order { first: self.stack.len(), depths: [0.0; 16] };
-        let at_once = S::f32s::LEN.max(8) as u32;
-        for from in (0..node.used).step_by(8) {
-            if from % at_once == 0 {
-                let lanes = from..node.used.min(from + at_once);
-                project(simd, view, sides, lanes, &mut self.part_boxes);
+    ) -> Option<(Slot, usize)> {
+        loop {
+            let depth = self.parts.len().checked_sub(1)?;
+            if self.part_boxes.len() == depth {
+                self.part_boxes.push(BoxesOnScreen::NONE);
             }
-            self.counters.boxes_projected += u64::from(node.used.min(from + 8) - from);
-            for lane in bits(self.part_boxes.inside & 0xFF << from) {
-                if node.child[lane] == Slot::EMPTY {
-                    continue;
+            let (part, boxes) = (&mut self.parts[depth], &mut self.part_boxes[depth]);
+            let node = &nodes[part.node as usize];
+            let mut best: Option<usize> = None;
+            for lane in bits(part.lanes) {
+                if matches!(node.child[lane].child(), Child::Leaf(_)) {
+                    best = Some(lane);
+                    break;
                 }
-                *inside = true;
-                let shows = self.part_shows(simd, view, node.child[lane], lane, &mut order);
-                if shows.is_some() {
-                    return shows;
+                if best.is_none_or(|best| boxes.depth[lane] > boxes.depth[best]) {
+                    best = Some(lane);
                 }
+            }
+            if let Some(lane) = best {
+                part.lanes &= !(1 << lane);
+                return Some((node.child[lane], lane));
+            }
+            let (from, at_once) = (part.next, S::f32s::LEN.max(8) as u32);
+            if from >= node.used {
+                self.parts.pop();
+                continue;
+            }
+            if from % at_once == 0 {
+                let moved = widened(self.frame, node, at);
+                let sides = moved.as_ref().map_or([&node.min, &node.max], |[min, max]| [min, max]);
+                project(simd, view, sides, from..node.used.min(from + at_once), boxes);
+            }
+            part.next = node.used.min(from + 8);
+            self.counters.boxes_projected += u64::from(part.next - from);
+            for lane in bits(boxes.inside & 0xFF << from) {
+                part.lanes |= u16::from(node.child[lane] != Slot::EMPTY) << lane;
             }
         }
-        None
     }
 
-    /// Why one of the boxes of a mesh's tree that were just projected shows for certain.
+    /// Why a part shows that nothing needs to be asked about.
     #[inline(always)]
-    fn part_shows<S: Simd>(
-        &mut self,
-        simd: S,
-        view: &BoxView,
-        slot: Slot,
-        lane: usize,
-        order: &mut Order,
-    ) -> Option<Reason> {
-        let boxes = &self.part_boxes;
-        let nearest = boxes.depth[lane];
-        if nearest == f32::INFINITY {
+    fn part_is_certain(&self, view: &BoxView, lane: usize) -> Option<Reason> {
+        let boxes = &self.part_boxes[self.parts.len() - 1];
+        if boxes.depth[lane] == f32::INFINITY {
             return Some(Reason::ReachesNearPlane);
         }
-        if view.margin[0] > 0.0 && boxes.uncut >> lane & 1 == 0 {
-            return Some(Reason::Shows);
-        }
-        self.counters.boxes_asked += 1;
+        (view.margin[0] > 0.0 && boxes.uncut >> lane & 1 == 0).then_some(Reason::Shows)
+    }
+
+    #[inline(always)]
+    fn part_is_hidden<S: Simd>(&mut self, simd: S, lane: usize) -> bool {
+        let boxes = &self.part_boxes[self.parts.len() - 1];
         let rect = [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]];
-        if self.band.hides(simd, rect, nearest) {
+        let hidden = self.band.hides(simd, rect, boxes.depth[lane]);
+        self.counters.boxes_asked += 1;
+        if hidden {
             self.counters.boxes_hidden += 1;
             self.credit(rect);
-            return None;
         }
-        let Child::Node(child) = slot.child() else { return Some(Reason::Shows) };
-        let Order { first, depths } = order;
-        let mut to = self.stack.len();
-        self.stack.push(child);
-        depths[to - *first] = nearest;
-        while to > *first && depths[to - *first - 1] > depths[to - *first] {
-            self.stack.swap(to, to - 1);
-            depths.swap(to - *first, to - *first - 1);
-            to -= 1;
-        }
-        None
+        hidden
     }
 
     /// Asks again about the boxes of what was taken for visible before everything was drawn.
@@ -687,10 +673,19 @@ fn key(nearest: f32, instance: u32) -> u64 {
     u64::from(!nearest.to_bits()) << 32 | u64::from(instance)
 }
 
-/// How near the children of a node are that went onto the stack, from `first` on.
-struct Order {
-    first: usize,
-    depths: [f32; 16],
+/// A node of a mesh's tree being looked at.
+struct Part {
+    node: u32,
+    /// Children that were projected, but not looked at.
+    lanes: u16,
+    /// The first child that was not projected.
+    next: u32,
+}
+
+impl Part {
+    fn new(node: u32) -> Part {
+        Part { node, lanes: 0, next: 0 }
+    }
 }
 
 enum Shows {
