@@ -1,7 +1,7 @@
 //! What the hierarchical z-buffer asks of boxes: of the rectangle alone, or of the outline too
 //! [Greene 1995, §3.3.2].
 
-use super::{SIZES, TableInfo, column, frame_ms, index, view};
+use super::{SIZES, TableInfo, column, frames_ms, index, view};
 use crate::Options;
 use crate::report::{Cell, Table};
 use hither::render::{BoxTest, RenderOptions};
@@ -30,8 +30,8 @@ fn make(table: &mut Table, options: &Options) -> Result<(), String> {
                 (options.progress)(&format!("box-tests: {spec} {camera}"));
                 let view = view(index.scene(), camera, size)?;
                 let definitive = RenderOptions { box_test: BoxTest::Definitive, ..RenderOptions::default() };
-                let (fast_ms, fast) = frame_ms(&index, &view, &RenderOptions::default(), options)?;
-                let (slow_ms, slow) = frame_ms(&index, &view, &definitive, options)?;
+                let ways = [&RenderOptions::default(), &definitive];
+                let [(fast_ms, fast), (slow_ms, slow)] = frames_ms(&index, &view, ways, options)?;
                 table.push([
                     Cell::from(spec),
                     (*camera).into(),

@@ -1,15 +1,16 @@
 //! Who sees what: ids and depth at every pixel's centre, from scratch each frame, on one thread.
 
-use super::{SIZES, TableInfo, column, frame_ms, view, world};
+use super::{Frames, SIZES, TableInfo, column, view, world};
 use crate::Options;
 use crate::peers::{Peer, Sighting, obvhs::Obvhs};
 use crate::report::{Cell, Table};
-use crate::timing::{median_ms, timed};
+use crate::timing::{Sample, median_ms, medians_ms, timed};
 use hither::conventions::View;
 use hither::reference::zbuffer;
 use hither::render::{Algorithm, Frame, RenderOptions, render};
 use hither::{IndexOptions, SceneIndex};
 use std::collections::HashSet;
+use std::time::Duration;
 
 pub(crate) const INFO: TableInfo = TableInfo {
     name: "exact",
@@ -113,13 +114,27 @@ fn measure(
     textbook: bool,
     options: &Options,
 ) -> Result<Vec<Cell>, String> {
-    let plain = RenderOptions { algorithm: Algorithm::ZBuffer, ..RenderOptions::default() };
-    let (hzb, _) = frame_ms(index, view, &RenderOptions::default(), options)?;
-    let (zbuffer, _) = frame_ms(index, view, &plain, options)?;
+    let hierarchical = RenderOptions::default();
+    let plain = RenderOptions { algorithm: Algorithm::ZBuffer, ..hierarchical };
+    let (mut ours, mut plain) = (Frames::new(index, view, &hierarchical), Frames::new(index, view, &plain));
+    // The last peer's is compared with ours.
+    let (mut of_obvhs, mut of_embree) = (Sighting::default(), Sighting::default());
+    let mut no_peer = || Duration::ZERO;
+    let mut embree = peers.embree.as_ref().map(|e| || e.frame(view, 1, &mut of_embree));
+    let [hzb, zbuffer, obvhs, embree_ms] = medians_ms(
+        options,
+        [
+            &mut || ours.sample(),
+            &mut || plain.sample(),
+            &mut || peers.obvhs.frame(view, 1, &mut of_obvhs),
+            embree.as_mut().map_or(&mut no_peer as Sample, |sample| sample),
+        ],
+    );
+    let embree = peers.embree.as_ref().map(|_| embree_ms);
+    ours.counters()?;
+    plain.counters()?;
     let reference = textbook.then(|| median_ms(options, || timed(|| zbuffer::draw(index.scene(), view)).0));
-    let mut sighting = Sighting::default();
-    let obvhs = median_ms(options, || peers.obvhs.frame(view, 1, &mut sighting));
-    let embree = peers.embree.as_ref().map(|e| median_ms(options, || e.frame(view, 1, &mut sighting)));
+    let sighting = if embree.is_some() { of_embree } else { of_obvhs };
     let frame = render(index, view, &RenderOptions::default()).map_err(|e| e.to_string())?;
     let agreement = sighting.agreement(&frame);
     Ok(vec![

@@ -1,7 +1,7 @@
 //! The thesis's own figures for a frame of the office [Greene 1995, §3.5.2–3.5.3], beside ours for the
 //! corridor view of an office of the same plan.
 
-use super::{TableInfo, column, frame_ms, view, world};
+use super::{TableInfo, column, frames_ms, view, world};
 use crate::Options;
 use crate::report::{Cell, Table};
 use crate::timing::timed;
@@ -96,8 +96,7 @@ fn figures(tree: TreeKind, options: &Options) -> Result<Figures, String> {
     let view = view(index.scene(), "corridor", (512, 512))?;
     let hzb = RenderOptions::default();
     let plain = RenderOptions { algorithm: Algorithm::ZBuffer, ..hzb };
-    let (hzb_ms, _) = frame_ms(&index, &view, &hzb, options)?;
-    let (plain_ms, _) = frame_ms(&index, &view, &plain, options)?;
+    let [(hzb_ms, _), (plain_ms, _)] = frames_ms(&index, &view, [&hzb, &plain], options)?;
     let recorded = |how: RenderOptions| {
         render(&index, &view, &RenderOptions { complexity: true, ..how }).map_err(|e| e.to_string())
     };

@@ -16,12 +16,12 @@ mod simple;
 mod trees;
 
 use crate::report::{Column, Table};
-use crate::timing::median_ms;
+use crate::timing::{Sample, medians_ms, timed};
 use crate::{BenchError, Options};
 use hither::conventions::View;
 use hither::render::{Counters, RenderOptions, Renderer};
 use hither::{IndexOptions, Scene, SceneIndex};
-use std::time::Instant;
+use std::time::Duration;
 
 /// A table that can be asked for.
 #[derive(Clone, Copy, Debug)]
@@ -103,21 +103,54 @@ fn frame_ms(
     render: &RenderOptions,
     options: &Options,
 ) -> Result<(f64, Counters), String> {
-    let mut renderer = Renderer::new();
-    let mut counters = Counters::default();
-    let mut fault = None;
-    let time = median_ms(options, || {
-        let start = Instant::now();
-        let frame = renderer.render(index, view, render);
-        let time = start.elapsed();
-        match frame {
-            Ok(frame) => {
-                counters = frame.counters;
-                renderer.recycle(frame);
-            }
-            Err(e) => fault = Some(e.to_string()),
-        }
+    let [measured] = frames_ms(index, view, [render], options)?;
+    Ok(measured)
+}
+
+/// As [`frame_ms`] for several ways of rendering, measured in turns.
+fn frames_ms<const N: usize>(
+    index: &SceneIndex,
+    view: &View,
+    ways: [&RenderOptions; N],
+    options: &Options,
+) -> Result<[(f64, Counters); N], String> {
+    let mut frames = ways.map(|how| Frames::new(index, view, how));
+    let mut samples = frames.each_mut().map(|frames| || frames.sample());
+    let times = medians_ms(options, samples.each_mut().map(|sample| sample as Sample));
+    let mut measured = times.map(|time| (time, Counters::default()));
+    for ((_, counters), frames) in measured.iter_mut().zip(frames) {
+        *counters = frames.counters()?;
+    }
+    Ok(measured)
+}
+
+/// Frames of a view, each from scratch, one way.
+struct Frames<'a> {
+    index: &'a SceneIndex,
+    view: &'a View,
+    how: &'a RenderOptions,
+    renderer: Renderer,
+    last: Result<Counters, String>,
+}
+
+impl<'a> Frames<'a> {
+    fn new(index: &'a SceneIndex, view: &'a View, how: &'a RenderOptions) -> Frames<'a> {
+        Frames { index, view, how, renderer: Renderer::new(), last: Ok(Counters::default()) }
+    }
+
+    /// Draws one; how long that took.
+    fn sample(&mut self) -> Duration {
+        let (time, frame) = timed(|| self.renderer.render(self.index, self.view, self.how));
+        self.last = frame.map_err(|e| e.to_string()).map(|frame| {
+            let counters = frame.counters;
+            self.renderer.recycle(frame);
+            counters
+        });
         time
-    });
-    fault.map_or(Ok((time, counters)), Err)
+    }
+
+    /// What the last one did.
+    fn counters(self) -> Result<Counters, String> {
+        self.last
+    }
 }

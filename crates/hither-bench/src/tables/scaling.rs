@@ -1,6 +1,6 @@
 //! How a frame divides: on several threads, and into windows of several widths [Greene 1995, §3.5.5].
 
-use super::{SIZES, TableInfo, column, frame_ms, index, view};
+use super::{SIZES, TableInfo, column, frames_ms, index, view};
 use crate::Options;
 use crate::report::{Cell, Table};
 use hither::render::RenderOptions;
@@ -14,6 +14,7 @@ pub(crate) const THREADS: TableInfo = TableInfo {
         column("camera", "camera", 0),
         column("size", "size", 0),
         column("threads", "threads", 0),
+        column("one_thread_ms", "one thread, ms", 2),
         column("hzb_ms", "hzb ms", 2),
         column("speedup", "speed-up", 2),
     ],
@@ -33,7 +34,8 @@ pub(crate) const WINDOWS: TableInfo = TableInfo {
 
 fn threads(table: &mut Table, options: &Options) -> Result<(), String> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let counts: Vec<usize> = [1, 2, 4, 8, 16, 32].into_iter().filter(|&n| n <= cores.max(2)).collect();
+    let counts = [1, 2, 4, 8, 16, 32];
+    let ways = counts.map(|threads| RenderOptions { threads, ..RenderOptions::default() });
     for (spec, cameras) in
         [("office?n=33", &["corridor", "outside"][..]), ("spheres", &["front"]), ("clutter", &["front"])]
     {
@@ -42,18 +44,14 @@ fn threads(table: &mut Table, options: &Options) -> Result<(), String> {
             for size in SIZES {
                 (options.progress)(&format!("threads: {spec} {camera}"));
                 let view = view(index.scene(), camera, size)?;
-                let mut one = f64::NAN;
-                for &threads in &counts {
-                    let how = RenderOptions { threads, ..RenderOptions::default() };
-                    let (time, _) = frame_ms(&index, &view, &how, options)?;
-                    if threads == 1 {
-                        one = time;
-                    }
+                for (&threads, how) in counts.iter().zip(&ways).skip(1).filter(|(n, _)| **n <= cores.max(2)) {
+                    let [(one, _), (time, _)] = frames_ms(&index, &view, [&ways[0], how], options)?;
                     table.push([
                         Cell::from(spec),
                         (*camera).into(),
                         format!("{}x{}", size.0, size.1).into(),
                         threads.into(),
+                        one.into(),
                         time.into(),
                         (one / time).into(),
                     ]);
@@ -67,14 +65,12 @@ fn threads(table: &mut Table, options: &Options) -> Result<(), String> {
 fn windows(table: &mut Table, options: &Options) -> Result<(), String> {
     let index = index("office?n=33")?;
     let view = view(index.scene(), "corridor", (512, 512))?;
-    let mut measured = Vec::new();
-    for width in [512, 256, 128, 64, 32, 16] {
-        (options.progress)(&format!("windows: {width}"));
-        let how = RenderOptions { window_width: width, ..RenderOptions::default() };
-        measured.push((width, frame_ms(&index, &view, &how, options)?.0));
-    }
-    let whole = measured[0].1;
-    for (width, time) in measured {
+    (options.progress)("windows");
+    let widths = [512, 256, 128, 64, 32, 16];
+    let ways = widths.map(|width| RenderOptions { window_width: width, ..RenderOptions::default() });
+    let measured = frames_ms(&index, &view, ways.each_ref(), options)?;
+    let whole = measured[0].0;
+    for (width, (time, _)) in widths.into_iter().zip(measured) {
         table.push([
             Cell::from(u64::from(width)),
             u64::from(512 / width).into(),

@@ -1,6 +1,6 @@
 //! What the method costs where there is little to hide: one bare module, and three [Greene 1995, §3.5.1].
 
-use super::{SIZES, TableInfo, column, frame_ms, index, view};
+use super::{SIZES, TableInfo, column, frames_ms, index, view};
 use crate::Options;
 use crate::report::{Cell, Table};
 use hither::render::{Algorithm, RenderOptions};
@@ -28,8 +28,8 @@ fn make(table: &mut Table, options: &Options) -> Result<(), String> {
                 (options.progress)(&format!("simple: {spec} {camera}"));
                 let view = view(index.scene(), camera, size)?;
                 let plain = RenderOptions { algorithm: Algorithm::ZBuffer, ..RenderOptions::default() };
-                let (hzb, _) = frame_ms(&index, &view, &RenderOptions::default(), options)?;
-                let (zbuffer, _) = frame_ms(&index, &view, &plain, options)?;
+                let ways = [&RenderOptions::default(), &plain];
+                let [(hzb, _), (zbuffer, _)] = frames_ms(&index, &view, ways, options)?;
                 let greene = (camera == "outside" && size == SIZES[0]).then_some(greene);
                 table.push([
                     Cell::from(spec),
