@@ -97,23 +97,32 @@ impl Job<'_> {
     pub fn cargo_test(&mut self, arguments: &[&str]) -> Result<Outcome> {
         let mut command = Command::new(env!("CARGO"));
         command.arg("test").args(arguments);
-        self.run_tests(command)
+        self.run_tests(command, &[])
     }
 
-    /// Runs a `cargo test` in the workspace, showing its output and keeping its closing lines.
-    pub fn run_tests(&mut self, mut command: Command) -> Result<Outcome> {
+    /// Runs a `cargo test` in the workspace, showing its output and keeping its closing lines. Tests called as in `names`
+    /// must be among those that ran: a filter that no test answers to fails.
+    pub fn run_tests(&mut self, mut command: Command, names: &[&str]) -> Result<Outcome> {
         let mut child =
             command.current_dir(self.root).stdout(Stdio::piped()).spawn().context("cannot run cargo test")?;
         let stdout = child.stdout.take().context("cargo test has no output")?;
+        let mut missing = names.to_vec();
         for line in BufReader::new(stdout).lines() {
             let line = line?;
             println!("{line}");
+            if let Some(test) = line.strip_prefix("test ") {
+                missing.retain(|name| !test.contains(name));
+            }
             // Only the closing lines of runners that had something to run are worth repeating.
             if line.starts_with("test result:") && !line.contains(" 0 passed; 0 failed; 0 ignored;") {
                 self.results.push(line);
             }
         }
-        Ok(passed(child.wait()?.success()))
+        let succeeded = child.wait()?.success();
+        if succeeded && !missing.is_empty() {
+            println!("no test is called {}: was it renamed?", missing.join(", "));
+        }
+        Ok(passed(succeeded && missing.is_empty()))
     }
 
     /// Installs Debian packages where that is allowed and possible. What needs them finds out whether it was.

@@ -23,17 +23,10 @@ const PACKAGES: &[&str] = &["rustc-web", "gcc-aarch64-linux-gnu", "libc6-dev-arm
 const STANDARD_LIBRARY: &str = "libstd-rust-web-dev";
 
 /// The digests that other machines have too, and what of the tests of visibility an emulator runs soon enough.
-const TESTS: &[&str] = &[
-    "--package=hither",
-    "--profile=portable",
-    "--no-fail-fast",
-    "--test=bits",
-    "--test=visibility",
-    "--",
-    "everywhere",
-    "coherence_changes_nothing_while_the_eye_moves",
-    "shared_edges_are_drawn_exactly_once",
-];
+const TESTS: &[&str] =
+    &["--package=hither", "--profile=portable", "--no-fail-fast", "--test=bits", "--test=visibility", "--"];
+const NAMES: &[&str] =
+    &["everywhere", "coherence_changes_nothing_while_the_eye_moves", "shared_edges_are_drawn_exactly_once"];
 
 /// Builds and runs the tests of the engine that try what NEON does.
 pub fn run(job: &mut Job) -> Result<Outcome> {
@@ -59,13 +52,14 @@ pub fn run(job: &mut Job) -> Result<Outcome> {
         // Of another compiler than everything else: it would only be in the way there.
         .arg(&folder)
         .args(TESTS)
+        .args(NAMES)
         // Code that is not optimised keeps each vector it ever made on the stack.
         .env("RUST_MIN_STACK", STACK_BYTES)
         .env("RUSTC", RUSTC)
         .env(variable("LINKER"), LINKER)
         .env(variable("RUNNER"), format!("{RUNNER} -L {C_LIBRARY}"))
         .env("CARGO_ENCODED_RUSTFLAGS", format!("--sysroot\x1f{}", sysroot.join("usr").display()));
-    job.run_tests(command)
+    job.run_tests(command, NAMES)
 }
 
 /// Where the standard library for ARM of Debian's compiler is, or what to do to have both.
