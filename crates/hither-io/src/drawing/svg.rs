@@ -122,13 +122,16 @@ fn write_faces(file: &mut dyn Write, sheet: &Sheet, view: &SheetView) -> io::Res
     Ok(())
 }
 
+/// Nothing is drawn farther from the sheet's corner than that, in its smallest steps, so that steps can be told.
+const FARTHEST: glam::DVec2 = glam::DVec2::splat(1e15);
+
 /// A subpath: where it starts, then steps.
 fn push_path(text: &mut Vec<u8>, sheet: &Sheet, view: &SheetView, points: &[glam::DVec2], closes: bool) {
     let digits = digits(sheet.unit);
     let parts = 10f64.powi(digits as i32);
     let fixed = |p: glam::DVec2| {
-        let at = view.place(p) * parts;
-        [at.x.round() as i64, at.y.round() as i64]
+        let at = (view.place(p) * parts).round().clamp(-FARTHEST, FARTHEST);
+        [at.x as i64, at.y as i64]
     };
     let Some(&first) = points.first() else { return };
     let mut last = fixed(first);

@@ -224,6 +224,9 @@ impl View {
                 }
             }
         }
+        if !self.pixels_per_unit().is_finite() {
+            return Err(ViewError::Camera("it sees so little that no number says how large that is drawn"));
+        }
         Ok(())
     }
 }
