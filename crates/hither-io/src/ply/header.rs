@@ -1,6 +1,7 @@
 //! The header of a PLY file: which elements follow, in which order, and what each is made of.
 
 use crate::text::{self, quoted};
+use std::collections::HashSet;
 
 /// How the numbers after the header are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,6 +86,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
         HeaderLines::new(bytes).ok_or("it does not begin with a line \"ply\"; it is not a PLY file")?;
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
+    // A header may declare as many elements as it has room for: each is asked for once, not held against all others.
+    let mut declared: HashSet<String> = HashSet::new();
     loop {
         let Some(line) = lines.next() else {
             return Err("its header does not end; it is truncated, or not a PLY file".into());
@@ -98,7 +101,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
             Some(b"format") => encoding = Some(encoding_named(rest).map_err(at)?),
             Some(b"element") => {
                 let element = element(rest).map_err(at)?;
-                if elements.iter().any(|known| known.name == element.name) {
+                if !declared.insert(element.name.clone()) {
                     return Err(at(format!(
                         "the element {} is declared twice",
                         quoted(element.name.as_bytes())
@@ -198,6 +201,18 @@ mod tests {
             assert_eq!(vertex.properties[1], Property { name: "y".into(), kind: Kind::F64, list: None });
             assert_eq!(face.properties[0].list, Some(Kind::U8));
         }
+    }
+
+    /// Comparing each with all others would take minutes.
+    #[test]
+    fn many_elements_are_as_many_steps() {
+        const COUNT: usize = 200_000;
+        let element = |i: usize| format!("element e{i} 0\nproperty float x\n");
+        let elements: String = (0..COUNT).map(element).collect();
+        let text = format!("ply\nformat ascii 1.0\n{elements}end_header\n");
+        assert_eq!(parse(text.as_bytes()).unwrap().elements.len(), COUNT);
+        let again = text.replace("end_header", "element e0 1\nend_header");
+        assert!(parse(again.as_bytes()).unwrap_err().contains("the element \"e0\" is declared twice"));
     }
 
     #[test]
