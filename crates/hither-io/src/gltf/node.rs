@@ -63,10 +63,9 @@ pub(super) fn read(buffers: &Buffers, oddities: &mut Oddities) -> Result<Hierarc
         let at = hierarchy.group.push(Node { name: source.name.clone(), parent, local, content: own });
         hierarchy.place[index.at()] = Some(at);
         if let Some(instancing) = instancing {
-            let places = instances(buffers, instancing).map_err(|f| f.at(here()))?;
+            let places = instances(buffers, instancing, &source.name).map_err(|f| f.at(here()))?;
             for (i, local) in places.into_iter().enumerate() {
-                let name =
-                    if source.name.is_empty() { String::new() } else { format!("{}[{i}]", source.name) };
+                let name = instance_name(&source.name, i);
                 hierarchy.group.push(Node { name, parent: Some(at), local, content });
             }
         }
@@ -166,8 +165,13 @@ fn unit(q: DQuat) -> Option<DQuat> {
     (length.is_finite() && length > 1e-300).then(|| q / length).filter(|q| q.is_finite())
 }
 
-/// The transforms of `EXT_mesh_gpu_instancing`.
-fn instances(buffers: &Buffers, from: &json::Instancing) -> Result<Vec<Transform>, Fault> {
+/// How instance `i` of the node called `name` is called. It takes no more memory than it has letters.
+fn instance_name(name: &str, i: usize) -> String {
+    if name.is_empty() { String::new() } else { [name, "[", &i.to_string(), "]"].concat() }
+}
+
+/// The transforms of `EXT_mesh_gpu_instancing`. Its nodes and their names, which repeat `name`, are paid for.
+fn instances(buffers: &Buffers, from: &json::Instancing, name: &str) -> Result<Vec<Transform>, Fault> {
     let resolve = |name: &'static str| -> Result<Option<Elements>, Fault> {
         match from.attributes.get(name) {
             Some(&index) => Elements::resolve(buffers, index).map(Some).map_err(|f| f.at(name)),
@@ -181,7 +185,8 @@ fn instances(buffers: &Buffers, from: &json::Instancing) -> Result<Vec<Transform
     if all.into_iter().flatten().any(|e| e.count() != count) {
         return malformed("its instances' attributes differ in number");
     }
-    buffers.spend((count as u64).saturating_mul(size_of::<Node>() as u64))?;
+    let each = size_of::<Node>() + instance_name(name, count).len();
+    buffers.spend((count as u64).saturating_mul(each as u64))?;
     let translations = translations.map(|e| e.floats::<3>()).transpose()?;
     let rotations = rotations.map(|e| e.floats::<4>()).transpose()?;
     let scales = scales.map(|e| e.floats::<3>()).transpose()?;

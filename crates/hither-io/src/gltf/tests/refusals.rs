@@ -89,6 +89,21 @@ fn many_meshes_of_one_view_cannot_fill_the_memory() {
 }
 
 #[test]
+fn many_instances_of_a_long_name_cannot_fill_the_memory() {
+    let mut build = square();
+    let places = json!({ "componentType": FLOAT, "type": "VEC3", "count": 20_000 });
+    let places = build.push("accessors", places);
+    let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": places } } });
+    set(&mut build, "/nodes/0/extensions", instancing);
+    let scene = build.scene();
+    assert_eq!((scene.instance_count(), scene.root_group().nodes[1].name.as_str()), (20_000, "square[0]"));
+    set(&mut build, "/nodes/0/name", json!("N".repeat(40_000)));
+    let message = build.refusal();
+    assert!(message.contains("node 0 \"NNN") && message.contains("out of all proportion"), "{message}");
+    assert!(message.len() < 300);
+}
+
+#[test]
 fn an_index_out_of_range_is_named() {
     refused(
         |b| {
