@@ -11,6 +11,11 @@ use std::path::{Path, PathBuf};
 pub trait Companions {
     /// The content of the file called `name` in the model.
     fn load(&self, name: &str) -> Result<Vec<u8>, String>;
+
+    /// Which file that is: names for which this is the same stand for the same content, which is loaded once.
+    fn identity(&self, name: &str) -> PathBuf {
+        name.into()
+    }
 }
 
 impl<F: Fn(&str) -> Result<Vec<u8>, String>> Companions for F {
@@ -96,6 +101,12 @@ impl Companions for ModelFolder {
         File::open(&path).and_then(|mut file| file.read_to_end(&mut bytes)).map_err(failed)?;
         Ok(bytes)
     }
+
+    /// The file's real path, where there is one.
+    fn identity(&self, name: &str) -> PathBuf {
+        let real = self.locate(name).ok().and_then(|path| fs::canonicalize(path).ok());
+        real.unwrap_or_else(|| name.into())
+    }
 }
 
 #[cfg(test)]
@@ -133,6 +144,11 @@ mod tests {
         assert!(folder.load("far").unwrap_err().contains("link"));
         assert!(folder.load(".").unwrap_err().contains("regular"));
         assert!(folder.load("none").unwrap_err().contains("cannot read"));
+        std::os::unix::fs::symlink("near", top.join("inside/nearer")).unwrap();
+        for other in ["./near", "x/../near", "x\\..\\near", "nearer"] {
+            assert_eq!(folder.identity(other), folder.identity("near"), "{other}");
+        }
+        assert_ne!(folder.identity("none"), folder.identity("none at all"));
         let told = folder.load("a\nb\u{1b}[31m.bin").unwrap_err();
         assert!(told.contains("a\\nb\\u{1b}[31m.bin") && !told.contains(char::is_control), "{told:?}");
         fs::remove_dir_all(&top).unwrap();

@@ -1,7 +1,8 @@
 //! Buffers and buffer views: byte ranges that are checked before anyone sees them.
 //!
-//! Compressed views are decoded when first asked for. Everything that is expanded from the file is paid for
-//! from a budget that follows from the file's own length, so that a small file cannot fill the memory.
+//! A file that several buffers name is loaded once. Compressed views are decoded when first asked for.
+//! Everything that is expanded from the file is paid for from a budget that follows from the length of the file
+//! and of those that it names, so that a small file cannot fill the memory.
 
 use super::fault::{Fault, malformed, part, quoted, unsupported};
 use super::json::{Document, Index, Meshopt, Whole};
@@ -9,7 +10,9 @@ use super::meshopt::{self, Filter, Mode};
 use super::uri;
 use crate::Companions;
 use std::cell::{Cell, OnceCell};
+use std::collections::HashMap;
 use std::ops::Range;
+use std::path::PathBuf;
 
 /// What any file may expand to, bytes.
 const BUDGET_BASE: u64 = 256 << 20;
@@ -21,15 +24,38 @@ pub(super) struct Buffers<'a> {
     document: &'a Document,
     file: &'a [u8],
     contents: Vec<Content>,
+    loaded: Sources,
     decoded: Vec<OnceCell<Vec<u8>>>,
     budget: Cell<u64>,
 }
 
 enum Content {
     InFile(Range<usize>),
-    Loaded(Vec<u8>),
+    /// An index into what is loaded.
+    Loaded(usize),
     /// Stated without content: a stand-in for data that is only there in compressed form.
     Absent,
+}
+
+/// What is loaded from other files, each once, and from data URIs.
+#[derive(Default)]
+struct Sources {
+    bytes: Vec<Vec<u8>>,
+    of_file: HashMap<PathBuf, usize>,
+}
+
+impl Sources {
+    /// The index of what `uri` refers to, which is loaded if it is not there yet.
+    fn index(&mut self, uri: &str, companions: &dyn Companions) -> Result<usize, Fault> {
+        let file = uri::file(uri, companions);
+        if let Some(&known) = file.as_ref().and_then(|file| self.of_file.get(file)) {
+            return Ok(known);
+        }
+        let index = self.bytes.len();
+        self.bytes.push(uri::load(uri, companions)?);
+        self.of_file.extend(file.map(|file| (file, index)));
+        Ok(index)
+    }
 }
 
 impl<'a> Buffers<'a> {
@@ -41,7 +67,7 @@ impl<'a> Buffers<'a> {
         companions: &dyn Companions,
     ) -> Result<Buffers<'a>, Fault> {
         let mut contents = Vec::with_capacity(document.buffers.len());
-        let mut total = file.len() as u64;
+        let mut loaded = Sources::default();
         for (i, buffer) in document.buffers.iter().enumerate() {
             let place = || match &buffer.uri {
                 Some(uri) if !uri::is_data(uri) => part("buffer", i, uri),
@@ -50,7 +76,7 @@ impl<'a> Buffers<'a> {
             let Whole(length) = buffer.byte_length;
             let content = match &buffer.uri {
                 _ if buffer.extensions.meshopt.fallback => Content::Absent,
-                Some(uri) => Content::Loaded(uri::load(uri, companions).map_err(|f| f.at(place()))?),
+                Some(uri) => Content::Loaded(loaded.index(uri, companions).map_err(|f| f.at(place()))?),
                 None => match &bin {
                     Some(range) if i == 0 => Content::InFile(range.clone()),
                     _ => Content::Absent,
@@ -58,10 +84,7 @@ impl<'a> Buffers<'a> {
             };
             let have = match &content {
                 Content::InFile(range) => range.len() as u64,
-                Content::Loaded(bytes) => {
-                    total = total.saturating_add(bytes.len() as u64);
-                    bytes.len() as u64
-                }
+                Content::Loaded(index) => loaded.bytes[*index].len() as u64,
                 Content::Absent => length,
             };
             if have < length {
@@ -73,8 +96,9 @@ impl<'a> Buffers<'a> {
             contents.push(content);
         }
         let decoded = document.buffer_views.iter().map(|_| OnceCell::new()).collect();
+        let total = file.len() as u64 + loaded.bytes.iter().map(|b| b.len() as u64).sum::<u64>();
         let budget = Cell::new(BUDGET_BASE.saturating_add(total.saturating_mul(BUDGET_FACTOR)));
-        Ok(Buffers { document, file, contents, decoded, budget })
+        Ok(Buffers { document, file, contents, loaded, decoded, budget })
     }
 
     /// The document that the buffers belong to.
@@ -122,7 +146,7 @@ impl<'a> Buffers<'a> {
     fn slice(&self, buffer: Index, offset: Whole, length: Whole) -> Result<&[u8], Fault> {
         let bytes: &[u8] = match self.contents.get(buffer.at()) {
             Some(Content::InFile(range)) => &self.file[range.clone()],
-            Some(Content::Loaded(bytes)) => bytes,
+            Some(Content::Loaded(index)) => &self.loaded.bytes[*index],
             Some(Content::Absent) => {
                 return malformed(format!("buffer {} has no content: neither a URI nor a chunk", buffer.0));
             }

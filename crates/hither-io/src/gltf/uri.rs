@@ -8,6 +8,8 @@ use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use percent_encoding::percent_decode_str;
+use std::borrow::Cow;
+use std::path::PathBuf;
 
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
@@ -18,9 +20,20 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 
 /// The bytes that `uri` refers to.
 pub(super) fn load(uri: &str, companions: &dyn Companions) -> Result<Vec<u8>, Fault> {
-    if let Some(content) = data_content(uri) {
-        return decode_data(content);
+    match data_content(uri) {
+        Some(content) => decode_data(content),
+        None => companions.load(&file_name(uri)?).or_else(malformed),
     }
+}
+
+/// Which file `uri` refers to, however it is written; `None` if it refers to none, or the data is in it.
+pub(super) fn file(uri: &str, companions: &dyn Companions) -> Option<PathBuf> {
+    let name = if is_data(uri) { None } else { file_name(uri).ok() };
+    name.map(|name| companions.identity(&name))
+}
+
+/// The name of the file that `uri` refers to.
+fn file_name(uri: &str) -> Result<Cow<'_, str>, Fault> {
     // A scheme is a letter and then letters, digits, `+`, `-`, `.`; `C:` of Windows looks the same.
     if let Some((scheme, _)) = uri.split_once(':')
         && scheme.starts_with(|c: char| c.is_ascii_alphabetic())
@@ -32,7 +45,7 @@ pub(super) fn load(uri: &str, companions: &dyn Companions) -> Result<Vec<u8>, Fa
         ));
     }
     match percent_decode_str(uri).decode_utf8() {
-        Ok(name) => companions.load(&name).or_else(malformed),
+        Ok(name) => Ok(name),
         Err(_) => malformed("its name is not UTF-8 once decoded"),
     }
 }

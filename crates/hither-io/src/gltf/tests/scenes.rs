@@ -1,9 +1,12 @@
 //! Hierarchies, instancing, cameras and animations.
 
 use super::build::*;
+use crate::gltf::from_bytes;
 use glam::{DAffine3, DQuat, DVec3, Vec4};
 use hither::scene::{CameraProjection, Content, Interpolation, Property, Transform};
 use serde_json::json;
+use std::cell::Cell;
+use std::path::Path;
 
 #[test]
 fn ten_thousand_nested_nodes_are_read_in_order() {
@@ -197,4 +200,29 @@ fn skins_and_morphs_are_told_of_and_drawn_at_rest() {
 fn an_empty_document_is_an_empty_scene() {
     let scene = Build::new().scene();
     assert_eq!((scene.instance_count(), scene.bounds()), (0, None));
+}
+
+#[test]
+fn a_file_that_many_buffers_name_is_loaded_once() {
+    let mut build = square();
+    let file = std::mem::take(&mut build.bin);
+    let names = ["a%20b.bin", "a b.bin", "%61 b.bin"];
+    build.json["buffers"] = names.iter().map(|n| json!({ "uri": n, "byteLength": 60 })).collect();
+    for i in 3..300 {
+        build.push("buffers", json!({ "uri": names[i % 3], "byteLength": 60 }));
+    }
+    build.json["bufferViews"][1]["buffer"] = 299.into();
+    let loads = Cell::new(0);
+    let beside = |name: &str| {
+        assert_eq!(name, "a b.bin");
+        loads.set(loads.get() + 1);
+        Ok(file.clone())
+    };
+    let loaded = from_bytes(Path::new("test.glb"), &build.glb(), &beside).unwrap();
+    assert_eq!(loaded.scene.meshes[0].triangles, [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(loads.get(), 1);
+    // What one of them asks for beyond the file's end is still told of that one.
+    build.json["buffers"][7]["byteLength"] = 61.into();
+    let refused = from_bytes(Path::new("test.glb"), &build.glb(), &beside).unwrap_err().to_string();
+    assert!(refused.contains("buffer 7 \"a b.bin\"") && refused.contains("there are 60"), "{refused}");
 }
