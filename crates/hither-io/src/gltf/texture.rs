@@ -1,7 +1,8 @@
 //! Textures: the images that base colours use, decoded by a library.
 //!
-//! An image that cannot be had is told of and its texture left out; the model is read all the same. All
-//! images together are decoded to no more than a set total.
+//! An image that cannot be had is told of and its texture left out; the model is read all the same. Images of the
+//! same source, a buffer view or a file, are one: it is fetched and decoded once. All images together are decoded
+//! to no more than a set total.
 
 use super::buffers::Buffers;
 use super::fault::{Fault, Oddities, malformed, part, quoted, unsupported};
@@ -11,7 +12,9 @@ use super::uri;
 use crate::{Companions, texture};
 use hither::scene::Texture;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, HashMap};
+use std::path::PathBuf;
 
 /// The scene's textures, and which of them each of the document's textures is.
 pub(super) struct Textures {
@@ -46,28 +49,29 @@ impl Textures {
         let mut images: Vec<u32> = image_of.values().copied().collect();
         images.sort_unstable();
         images.dedup();
+        let shared = by_source(document, &images, companions);
         let mut budget = texture::Budget::default();
-        let fetched: Vec<(u32, Result<Vec<u8>, Fault>)> = images
-            .into_iter()
-            .map(|image| (image, fetch(buffers, image as usize, companions, &mut budget)))
-            .collect();
-        let decode = |(image, bytes): (u32, Result<Vec<u8>, Fault>)| {
-            let name = name_of(document, image as usize);
-            let texture = bytes.and_then(|b| texture::decode(&name, &b).or_else(malformed));
-            (image, texture)
+        let mut fetch = |images: &Vec<u32>| fetch(buffers, images[0] as usize, companions, &mut budget);
+        let fetched: Vec<Result<Cow<[u8]>, Fault>> = shared.iter().map(&mut fetch).collect();
+        let decode = |(bytes, images): (Result<Cow<[u8]>, Fault>, &Vec<u32>)| {
+            let name = name_of(document, images[0] as usize);
+            bytes.and_then(|b| texture::decode(&name, &b).or_else(malformed))
         };
-        let decoded: Vec<(u32, Result<Texture, Fault>)> = fetched.into_par_iter().map(decode).collect();
+        let decoded: Vec<Result<Texture, Fault>> = fetched.into_par_iter().zip(&shared).map(decode).collect();
         let mut textures = Vec::new();
         let mut by_image = BTreeMap::new();
-        for (image, decoded) in decoded {
+        for (images, decoded) in shared.iter().zip(decoded) {
             match decoded {
                 Ok(texture) => {
-                    by_image.insert(image, textures.len() as u32);
+                    by_image.extend(images.iter().map(|&image| (image, textures.len() as u32)));
                     textures.push(texture);
                 }
                 Err(fault) => {
-                    let name = name_of(document, image as usize);
-                    oddities.note(part("image", image as usize, &name), left_out(fault));
+                    let message = left_out(fault);
+                    for &image in images {
+                        let name = name_of(document, image as usize);
+                        oddities.note(part("image", image as usize, &name), message.as_str());
+                    }
                 }
             }
         }
@@ -112,17 +116,43 @@ fn image_of_texture(document: &Document, texture: Index) -> Result<u32, Fault> {
     Ok(image.0)
 }
 
+/// Where the bytes of an image are, so far as another image may have the same.
+#[derive(PartialEq, Eq, Hash)]
+enum Source {
+    View(u32),
+    File(PathBuf),
+}
+
+/// The images in lists of the same source, each list by its first image.
+fn by_source(document: &Document, images: &[u32], companions: &dyn Companions) -> Vec<Vec<u32>> {
+    let mut lists: Vec<Vec<u32>> = Vec::new();
+    let mut known: HashMap<Source, usize> = HashMap::new();
+    for &image in images {
+        let described = &document.images[image as usize];
+        let source = match (&described.uri, described.buffer_view) {
+            (Some(uri), _) => uri::file(uri, companions).map(Source::File),
+            (None, view) => view.map(|view| Source::View(view.0)),
+        };
+        let new = lists.len();
+        match source.map_or(new, |source| *known.entry(source).or_insert(new)) {
+            at if at < new => lists[at].push(image),
+            _ => lists.push(vec![image]),
+        }
+    }
+    lists
+}
+
 /// The bytes of an image, paid for from `budget`.
-fn fetch(
-    buffers: &Buffers,
+fn fetch<'a>(
+    buffers: &'a Buffers,
     image: usize,
     companions: &dyn Companions,
     budget: &mut texture::Budget,
-) -> Result<Vec<u8>, Fault> {
+) -> Result<Cow<'a, [u8]>, Fault> {
     let source = &buffers.document().images[image];
     let bytes = match (&source.uri, source.buffer_view) {
-        (Some(uri), _) => uri::load(uri, companions)?,
-        (None, Some(view)) => buffers.view(view)?.to_vec(),
+        (Some(uri), _) => Cow::Owned(uri::load(uri, companions)?),
+        (None, Some(view)) => Cow::Borrowed(buffers.view(view)?),
         (None, None) => return malformed("it has neither a URI nor a buffer view"),
     };
     budget.pay(&bytes).or_else(unsupported)?;

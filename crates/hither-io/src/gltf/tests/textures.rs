@@ -1,11 +1,13 @@
 //! Materials and the images that they use.
 
 use super::build::*;
+use crate::Loaded;
 use crate::gltf::from_bytes;
 use crate::texture::tests::png_of;
 use glam::{DVec2, Vec2, Vec4};
 use hither::scene::{AlphaMode, Filter, Wrap};
-use serde_json::json;
+use serde_json::{Value, json};
+use std::cell::Cell;
 use std::path::Path;
 
 const RED: [u8; 4] = [255, 0, 0, 255];
@@ -128,4 +130,44 @@ fn images_come_from_files_data_and_other_formats() {
     build.json["textures"][0] = json!({ "extensions": { "EXT_texture_webp": { "source": 1 } } });
     build.json["extensionsRequired"] = json!(["EXT_texture_webp"]);
     assert_eq!(build.scene().textures[0].texels, [RED]);
+}
+
+#[test]
+fn images_of_one_source_are_fetched_and_decoded_once() {
+    const COUNT: usize = 300;
+    // Of one buffer view; a file by two names; and a view that holds no image.
+    let view: fn(usize) -> Value = |_| json!({ "bufferView": 4 });
+    let file: fn(usize) -> Value = |i| json!({ "uri": if i < 100 { "a%20b.png" } else { "a b.png" } });
+    let wrong: fn(usize) -> Value = |_| json!({ "bufferView": 0 });
+    for (source, textures, loads) in [(view, 1, 0), (file, 1, 1), (wrong, 0, 0)] {
+        let mut build = textured();
+        assert_eq!(build.json["images"][0]["bufferView"], 4);
+        let material = build.json["materials"][0].clone();
+        let primitive = build.json["meshes"][0]["primitives"][0].clone();
+        for list in ["images", "textures", "materials"] {
+            build.json[list] = json!([]);
+        }
+        build.json["meshes"][0]["primitives"] = json!([]);
+        for i in 0..COUNT {
+            build.push("images", source(i));
+            build.push("textures", json!({ "source": i }));
+            let mut material = material.clone();
+            material["pbrMetallicRoughness"]["baseColorTexture"]["index"] = i.into();
+            build.push("materials", material);
+            let mut primitive = primitive.clone();
+            primitive["material"] = i.into();
+            build.json["meshes"][0]["primitives"].as_array_mut().unwrap().push(primitive);
+        }
+        let loaded_files = Cell::new(0);
+        let beside = |_: &str| {
+            loaded_files.set(loaded_files.get() + 1);
+            Ok(png_of(1, 1, &[RED]))
+        };
+        let Loaded { scene, diagnostics } = from_bytes(Path::new("test.glb"), &build.glb(), &beside).unwrap();
+        assert_eq!((scene.textures.len(), loaded_files.get()), (textures, loads));
+        let shown = scene.materials.iter().filter(|m| m.texture.is_some_and(|t| t.texture == 0)).count();
+        assert_eq!((scene.materials.len(), shown), (COUNT, COUNT * textures));
+        let told: Vec<&str> = diagnostics.iter().map(|d| d.place.as_str()).collect();
+        assert_eq!(told, &["image 0 and 299 more"][textures..]);
+    }
 }
