@@ -361,7 +361,13 @@ impl Piece {
 
     fn other(&mut self, line: &[u8], number: u64) {
         let mut rest = line;
-        let Some(keyword) = text::word(&mut rest) else { return };
+        let Some(keyword) = text::word(&mut rest) else {
+            // Zeros part words, too; where there is nothing else, they are what a crash or a bad disk leaves.
+            if line.contains(&0) {
+                self.oddities.in_line(number, "a line holds zero bytes instead of text and is left out");
+            }
+            return;
+        };
         let rest = rest.trim_ascii();
         let all = &mut self.statements;
         all.known_lines += 1;

@@ -257,7 +257,7 @@ fn several_libraries_on_a_line_are_found() {
 #[test]
 fn what_is_not_obj_is_refused_and_what_is_empty_read() {
     let garbage: Vec<u8> = (0..4000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
-    for bytes in [&garbage[..], b"<html>\n<body>", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"] {
+    for bytes in [&garbage[..], b"<html>\n<body>", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", &[0; 1000]] {
         let refused = from_bytes(Path::new("m.obj"), bytes, &nothing_there).unwrap_err();
         assert!(matches!(refused, Error::Malformed { .. }));
         assert!(!refused.to_string().contains('\n'));
@@ -266,6 +266,8 @@ fn what_is_not_obj_is_refused_and_what_is_empty_read() {
         let loaded = read(text);
         assert!(loaded.scene.bounds().is_none() && loaded.scene.instance_count() == 0);
     }
+    let told = messages(&read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n\0\0\0"));
+    assert_eq!(told, ["line 5: a line holds zero bytes instead of text and is left out"]);
 }
 
 #[test]

@@ -7,14 +7,15 @@
 //!   faces are flat, and the order of the corners says which side is the front. Colours in the attribute
 //!   bytes, of which there are several dialects, are not used either.
 //! - STL solids are often not closed: the material is double-sided.
-//! - Triangles without area are dropped, those with a coordinate that is no number left out with a diagnostic.
+//! - Triangles without area are dropped, those with a coordinate that is no number left out with a diagnostic;
+//!   where that is the lot of all triangles, the file is refused.
 //! - A binary file whose header claims more triangles than it holds is refused. That a file begins with
 //!   `solid` does not make it text: many binary ones do.
 
 mod text;
 
 use crate::input;
-use crate::oddities::Oddities;
+use crate::oddities::{Losses, Oddities};
 use crate::polygon::doubled_area;
 use crate::weld::Welder;
 use crate::{Error, Loaded};
@@ -88,14 +89,43 @@ fn binary(bytes: &[u8], scene: &mut Scene, oddities: &mut Oddities) -> Result<()
         );
     }
     let mut solid = Solid::default();
+    let mut odd = Odd { unit: "triangle", oddities, losses: Losses::default() };
     for (i, record) in records[..claimed as usize].iter().enumerate() {
         let floats = record[12..48].as_chunks::<4>().0;
         let corner =
             |at: usize| Vec3::from_array([0, 1, 2].map(|axis| f32::from_le_bytes(floats[3 * at + axis])));
-        solid.triangle([corner(0), corner(1), corner(2)], || format!("triangle {i}"), oddities);
+        solid.triangle([corner(0), corner(1), corner(2)], i as u64, &mut odd);
     }
     solid.finish(scene);
-    Ok(())
+    odd.refusal().map_or(Ok(()), Err)
+}
+
+/// What is odd about a file, and what of it is lost.
+struct Odd<'a> {
+    /// What numbers count: triangles, or lines of text.
+    unit: &'static str,
+    oddities: &'a mut Oddities,
+    losses: Losses,
+}
+
+impl Odd<'_> {
+    #[cold]
+    fn note(&mut self, number: u64, what: &'static str) {
+        let unit = self.unit;
+        self.oddities.note(what, || format!("{unit} {number}"), || what.to_owned());
+    }
+
+    /// A triangle or a loop is left out that would be seen if it were understood.
+    #[cold]
+    fn lose(&mut self, number: u64, why: &'static str) {
+        self.losses.lost(number, why);
+        self.note(number, why);
+    }
+
+    /// The line that refuses the file, if all of it is lost.
+    fn refusal(&self) -> Option<String> {
+        self.losses.refusal(self.unit)
+    }
 }
 
 /// A solid as it grows.
@@ -109,7 +139,7 @@ struct Solid {
 impl Solid {
     /// Adds a triangle that has an area and no infinite or undefined coordinate.
     #[inline]
-    fn triangle(&mut self, corners: [Vec3; 3], place: impl FnOnce() -> String, oddities: &mut Oddities) {
+    fn triangle(&mut self, corners: [Vec3; 3], number: u64, odd: &mut Odd) {
         let [a, b, c] = corners;
         if !corners.iter().all(|p| p.is_finite()) {
             let what = match corners.iter().any(|p| p.is_nan()) {
@@ -118,9 +148,11 @@ impl Solid {
                     "a triangle has a coordinate that is infinite or beyond 32-bit floats and is left out"
                 }
             };
-            oddities.note(what, place, || what.to_owned());
-        } else if doubled_area(a, b, c) == glam::DVec3::ZERO {
-            oddities.note("no area", place, || "a triangle without area is left out".into());
+            return odd.lose(number, what);
+        }
+        odd.losses.understood();
+        if doubled_area(a, b, c) == glam::DVec3::ZERO {
+            odd.note(number, "a triangle without area is left out");
         } else {
             self.triangles.push(corners.map(|p| self.welder.vertex(p)));
         }
@@ -249,6 +281,44 @@ mod tests {
         assert!(told[0].contains("triangle 1") && told[0].contains("without area is left out (2 times)"));
         assert_eq!(told[1], "triangle 2: a triangle has a coordinate that is no number and is left out");
         assert!(told[2].contains("triangle 3") && told[2].contains("infinite or beyond 32-bit floats"));
+    }
+
+    #[test]
+    fn a_file_all_of_whose_triangles_are_lost_is_refused() {
+        let [a, b, c, _] = CORNERS;
+        let bad = [f32::NAN, 0.0, 0.0];
+        let told = refusal(&binary_file("", &[[a, b, bad]]));
+        assert!(
+            told.contains(
+                "its only face is lost (triangle 0: a triangle has a coordinate that is no number)"
+            )
+        );
+        let told = refusal(&binary_file("", &[[[f32::INFINITY; 3], b, c], [a, b, bad]]));
+        assert!(told.contains("all of its 2 faces are lost (triangle 0: ") && told.contains("beyond 32-bit"));
+        let facet = |corners: &[&str]| {
+            let vertices: String = corners.iter().map(|c| format!("vertex {c}\n")).collect();
+            format!("facet normal 0 0 1\nouter loop\n{vertices}endloop\nendfacet\n")
+        };
+        let corners = ["0 0 0", "1 0 0", "0 1", "0 1 0"];
+        for (text, part) in [
+            (
+                facet(&corners[..3]),
+                "its only face is lost (line 7: a triangle has a coordinate that is no number)",
+            ),
+            (facet(&corners), "(line 8: a loop has a coordinate that is no number)"),
+            (
+                facet(&corners[..2]) + &facet(&corners[..1]),
+                "2 faces are lost (line 6: a loop has fewer than three",
+            ),
+            ("facet\nouter loop\nvertex 0 0 0\nvertex 1".into(), "(line 5: the file ends within a facet)"),
+        ] {
+            let told = refusal(format!("solid part\n{text}").as_bytes());
+            assert!(told.starts_with("part.stl: ") && told.contains(part), "{told}");
+        }
+        // What only has no area is not lost, and neither is a file that never had a triangle.
+        for bytes in [binary_file("", &[[a, b, bad], [a, a, b]]), binary_file("", &[])] {
+            assert!(read(&bytes).unwrap().scene.bounds().is_none());
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! STL as text: solids of facets of loops of vertices. Lenient: only what says where corners are matters.
 
-use super::Solid;
-use crate::oddities::Oddities;
+use super::{Odd, Solid};
+use crate::oddities::{Losses, Oddities};
 use crate::polygon::{Fit, Triangulator};
 use crate::text::{self, Lines, quoted};
 use glam::Vec3;
@@ -10,6 +10,7 @@ use hither::scene::Scene;
 /// Appends a part for each solid; on failure a line that says why.
 pub(super) fn read(bytes: &[u8], scene: &mut Scene, oddities: &mut Oddities) -> Result<(), String> {
     let mut reader = Reader::default();
+    let mut odd = Odd { unit: "line", oddities, losses: Losses::default() };
     let mut lines = Lines::plain(text::without_mark(bytes));
     let mut number = 0;
     while let Some(line) = lines.next() {
@@ -21,31 +22,33 @@ pub(super) fn read(bytes: &[u8], scene: &mut Scene, oddities: &mut Oddities) -> 
             reader.vertex(rest);
         } else if is("facet") || is("endfacet") || is("outer") || is("endloop") {
             reader.facets += u64::from(is("facet"));
-            reader.close_loop(number, oddities);
+            reader.close_loop(number, &mut odd);
         } else if is("solid") {
             reader.end_solid(scene);
             reader.solid.name = String::from_utf8_lossy(rest.trim_ascii()).into_owned();
             reader.is_open = true;
         } else if is("endsolid") {
-            reader.close_loop(number, oddities);
+            reader.close_loop(number, &mut odd);
             reader.end_solid(scene);
         } else {
-            oddities.note(
+            odd.oddities.note(
                 "unknown",
                 || format!("line {number}"),
                 || format!("{} is not a word of the format; the line is left out", quoted(word)),
             );
         }
     }
-    if reader.facets == 0 && (reader.is_open || !oddities.is_empty()) {
+    if reader.facets == 0 && (reader.is_open || !odd.oddities.is_empty()) {
         return Err("it begins with \"solid\" but holds no facet; is it damaged, or another format?".into());
     }
     if reader.is_open {
-        let message = || "the file ends within a solid; what was complete is read".to_owned();
-        oddities.note("end", || format!("line {number}"), message);
+        if !reader.outline.is_empty() {
+            odd.losses.lost(number, "the file ends within a facet");
+        }
+        odd.note(number, "the file ends within a solid; what was complete is read");
     }
     reader.end_solid(scene);
-    Ok(())
+    odd.refusal().map_or(Ok(()), Err)
 }
 
 #[derive(Default)]
@@ -70,35 +73,35 @@ impl Reader {
     }
 
     /// Makes triangles of the corners that were given, if any.
-    fn close_loop(&mut self, number: u64, oddities: &mut Oddities) {
+    fn close_loop(&mut self, number: u64, odd: &mut Odd) {
         match self.outline[..] {
             [] => return,
             [_] | [_, _] => {
-                oddities.in_line(number, "a loop has fewer than three corners and is left out");
+                odd.lose(number, "a loop has fewer than three corners and is left out");
             }
-            [a, b, c] => self.solid.triangle([a, b, c], || format!("line {number}"), oddities),
-            _ => self.polygon(number, oddities),
+            [a, b, c] => self.solid.triangle([a, b, c], number, odd),
+            _ => self.polygon(number, odd),
         }
         self.outline.clear();
     }
 
     /// The format knows triangles alone, but some software writes more corners.
-    fn polygon(&mut self, number: u64, oddities: &mut Oddities) {
+    fn polygon(&mut self, number: u64, odd: &mut Odd) {
         if !self.outline.iter().all(|p| p.is_finite()) {
             let what = match self.outline.iter().any(|p| p.is_nan()) {
                 true => "a loop has a coordinate that is no number and is left out",
                 false => "a loop has a coordinate that is infinite or beyond 32-bit floats and is left out",
             };
-            oddities.in_line(number, what);
-            return;
+            return odd.lose(number, what);
         }
+        odd.losses.understood();
         self.cut.clear();
         if self.triangulator.triangulate(&self.outline, &mut self.cut) != Fit::Exact {
-            oddities.in_line(number, "a loop crosses itself or is too intricate; its triangles are a guess");
+            odd.note(number, "a loop crosses itself or is too intricate; its triangles are a guess");
         }
         for triangle in &self.cut {
             let corners = triangle.map(|i| self.outline[i as usize]);
-            self.solid.triangle(corners, || format!("line {number}"), oddities);
+            self.solid.triangle(corners, number, odd);
         }
     }
 
