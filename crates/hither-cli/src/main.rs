@@ -9,6 +9,7 @@ mod commands;
 mod console;
 mod eye;
 mod failure;
+mod files;
 mod numbers;
 mod options;
 mod outputs;

@@ -50,30 +50,12 @@ pub fn numbered(path: &Path, frame: u32) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Checks that the file `output`, or one for each of `frames`, can be written, and a report to `report`.
-pub fn check(
-    output: Option<&Path>,
-    frames: Option<&Range<u32>>,
-    report: Option<&Path>,
-) -> Result<(), Failure> {
-    match (output, frames) {
-        (None, _) => {}
-        (Some(output), None) => hither_io::check_writable(output)?,
-        (Some(output), Some(frames)) => {
-            // The folder is the same for all; a thousand names show most other obstacles.
-            for frame in frames.clone().take(1000) {
-                hither_io::check_writable(&numbered(output, frame))?;
-            }
-        }
-    }
-    check_report(report)
-}
-
-/// Checks that a report can be written to `to`, if one is asked for.
-pub fn check_report(to: Option<&Path>) -> Result<(), Failure> {
-    match to {
-        Some(path) if path != Path::new("-") => Ok(hither_io::check_writable(path)?),
-        _ => Ok(()),
+/// The file `path`, or one for each of `frames`. Of many the first: the folder is the same for all, and a thousand
+/// names show most other obstacles.
+pub fn of_frames(path: &Path, frames: Option<&Range<u32>>) -> Vec<PathBuf> {
+    match frames {
+        Some(frames) => frames.clone().take(1000).map(|frame| numbered(path, frame)).collect(),
+        None => vec![path.to_owned()],
     }
 }
 

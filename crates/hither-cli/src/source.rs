@@ -9,6 +9,11 @@ use std::path::Path;
 /// The prefix of a generated world.
 const WORLD: &str = "world:";
 
+/// The file that the scene called `name` is read from; `None` for a world.
+pub fn file(name: &str) -> Option<&Path> {
+    (!name.starts_with(WORLD)).then(|| Path::new(name))
+}
+
 /// Reads or generates the scene called `name`, and prints what was odd about its file.
 pub fn open(name: &str, verbosity: Verbosity) -> Result<Scene, Failure> {
     if let Some(spec) = name.strip_prefix(WORLD) {

@@ -147,6 +147,61 @@ fn an_output_that_cannot_be_written_is_refused_before_the_work() {
 }
 
 #[test]
+fn no_file_that_is_named_is_written_over_another() {
+    let folder = Folder::new("over");
+    done(&["world", "office?n=1", "-o", &folder.path("model.glb")]);
+    let scene = &folder.path("model.glb");
+    // The first bytes say what a model is, whatever its name.
+    for other in ["model.png", "model.svg", "model.exr"] {
+        fs::copy(scene, folder.0.join(other)).unwrap();
+    }
+    fs::create_dir(folder.0.join("sheets")).unwrap();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("model.glb", folder.0.join("link.glb")).unwrap();
+    let before = (folder.names(), fs::read(scene).unwrap());
+    for (command, named) in [
+        ("info model.glb --json model.glb", "the scene"),
+        ("render model.glb -o x.png --json model.glb", "the scene"),
+        ("render model.png -o model.png", "the scene"),
+        ("render model.glb -o x.png --json ./x.png", "-o"),
+        ("render model.glb -o sheets/../x.png --json x.png", "-o"),
+        ("render world:office -o x.png --frames 2..9 --json x.0005.png", "-o"),
+        ("lines model.svg -o model.svg", "the scene"),
+        ("lines model.glb -o x.json --json x.json", "-o"),
+        ("order model.glb --dot model.glb", "the scene"),
+        ("order model.glb --dot x.dot --json x.dot", "--dot"),
+        ("cull model.svg --method planes --map model.svg", "the scene"),
+        ("cull model.glb --method planes --map x.svg --json x.svg", "--map"),
+        ("cull model.glb --json model.glb", "the scene"),
+        ("world office -o x.glb --json x.glb", "-o"),
+        ("layers model.exr -o model.exr", "the scene"),
+        ("layers model.glb -o x.ora --json x.ora", "-o"),
+        ("layers model.glb -o sheets --json sheets/program.json", "-o"),
+        ("layers model.glb -o x.ora --focus 3 --json x-focus.png", "-o"),
+        ("layers model.glb -o x.ora --replace a=model.png --json model.png", "--replace"),
+        #[cfg(unix)]
+        ("render link.glb -o x.png --json model.glb", "the scene"),
+        #[cfg(unix)]
+        ("info model.glb --json link.glb", "the scene"),
+    ] {
+        let is_file = |word: &str| word.contains('.') && !word.contains("..9");
+        let word = |word: &str| match word.split_once('=') {
+            Some((name, file)) => format!("{name}={}", folder.path(file)),
+            None if is_file(word) || word == "sheets" => folder.path(word),
+            None => word.to_owned(),
+        };
+        let arguments: Vec<String> = command.split(' ').map(word).collect();
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        refused(&arguments, 1, &[&format!(": this is the file of {named}, too, and one would be lost")]);
+        assert_eq!((folder.names(), fs::read(scene).unwrap()), before, "{command}");
+    }
+    // What holds nothing can be named as often as one likes.
+    if cfg!(unix) {
+        done(&["order", scene, "--dot", "/dev/null", "--json", "/dev/null"]);
+    }
+}
+
+#[test]
 fn pictures_have_the_size_and_the_names_that_were_asked_for() {
     let folder = Folder::new("pictures");
     done(&["render", WORLD, "-o", &folder.path("one.png"), "--size", "64x48"]);

@@ -52,6 +52,17 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
     }
 }
 
+/// The file or folder that `path` names, there or not: the same path whatever links lead to it, so that two names of
+/// one file can be told. `None` for pipes, terminals and devices, which hold nothing that could be lost.
+pub fn real_path(path: &Path) -> Option<PathBuf> {
+    let real = |path: &Path| fs::canonicalize(path).or_else(|_| std::path::absolute(path)).ok();
+    match fs::metadata(path) {
+        Ok(found) if is_stream_name(path) || !(found.is_file() || found.is_dir()) => None,
+        Ok(_) => real(path),
+        Err(_) => Some(real(folder_of(path))?.join(path.file_name()?)),
+    }
+}
+
 /// Where the bytes go.
 enum Destination {
     /// A pipe, a terminal or a device.
@@ -61,11 +72,8 @@ enum Destination {
 }
 
 fn destination(path: &Path) -> io::Result<Destination> {
-    let is_stream_name = path.starts_with("/dev/fd")
-        || path.starts_with("/proc/self/fd")
-        || ["/dev/stdout", "/dev/stderr"].iter().any(|name| path == Path::new(name));
     match fs::metadata(path) {
-        Ok(_) if is_stream_name => Ok(Destination::Stream),
+        Ok(_) if is_stream_name(path) => Ok(Destination::Stream),
         Ok(found) if found.is_dir() => Err(because(ErrorKind::IsADirectory, "it is a folder, not a file")),
         Ok(found) if found.is_file() => {
             // Renaming over a file needs no permission on the file itself; its owner's wish still counts.
@@ -92,6 +100,13 @@ fn destination(path: &Path) -> io::Result<Destination> {
         }
         Err(other) => Err(other),
     }
+}
+
+/// Whether the name is that of what a shell has opened, which may be a file.
+fn is_stream_name(path: &Path) -> bool {
+    path.starts_with("/dev/fd")
+        || path.starts_with("/proc/self/fd")
+        || ["/dev/stdout", "/dev/stderr"].iter().any(|name| path == Path::new(name))
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -175,6 +190,32 @@ mod tests {
         write_whole(&path, |w| w.write_all(b"new")).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(folder.entries(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn names_of_one_file_have_one_real_path() {
+        let folder = Folder::new("real");
+        let path = |name: &str| folder.0.join(name);
+        fs::create_dir(path("inner")).unwrap();
+        fs::write(path("file"), b"").unwrap();
+        std::os::unix::fs::symlink("file", path("link")).unwrap();
+        std::os::unix::fs::symlink("inner", path("other")).unwrap();
+        for (one, two) in [
+            ("file", "link"),
+            ("file", "inner/../file"),
+            ("file", "./file"),
+            ("inner/new", "other/new"),
+            ("inner", "other"),
+            ("none/new", "none/./new"),
+        ] {
+            assert!(real_path(&path(one)).is_some());
+            assert_eq!(real_path(&path(one)), real_path(&path(two)), "{one} {two}");
+        }
+        assert_ne!(real_path(&path("inner/new")), real_path(&path("new")));
+        for stream in ["/dev/null", "/dev/stdout"] {
+            assert_eq!(real_path(Path::new(stream)), None);
+        }
     }
 
     #[test]

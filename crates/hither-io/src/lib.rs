@@ -26,7 +26,7 @@ mod text;
 mod texture;
 mod weld;
 
-pub use atomic::{check_writable, write_whole};
+pub use atomic::{check_writable, real_path, write_whole};
 pub use companions::{Companions, ModelFolder};
 pub use drawing::{Sheet, SheetView, Unit, write_drawing_json, write_dxf, write_svg};
 pub use error::{Diagnostic, Error, Loaded};

@@ -1,6 +1,7 @@
 //! `hither bench`: how fast, against what?
 
 use crate::failure::Failure;
+use crate::files::Files;
 use crate::options::ReportOptions;
 use crate::{console, outputs};
 use std::fmt::Write;
@@ -21,7 +22,7 @@ pub struct Arguments {
 /// Measures, and prints a table or all of them.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (verbosity, to) = (arguments.report.verbosity(), arguments.report.json.as_deref());
-    outputs::check_report(to)?;
+    Files::default().reports(to)?;
     let spinner = verbosity.spinner("measuring".into());
     let sign = spinner.clone();
     let progress = Box::new(move |what: &str| {

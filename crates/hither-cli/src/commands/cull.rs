@@ -6,6 +6,7 @@ use super::report::{self, Seen};
 use crate::console::{self, Verbosity};
 use crate::eye::Eye;
 use crate::failure::Failure;
+use crate::files::Files;
 use crate::numbers::{count, grouped, short};
 use crate::options::{self, ReportOptions, ViewOptions};
 use crate::outputs;
@@ -78,8 +79,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     check(arguments)?;
     let verbosity = arguments.report.verbosity();
     let to = arguments.report.json.as_deref();
-    planes::check_map(arguments)?;
-    outputs::check_report(to)?;
+    let mut files = Files::of_scene(&arguments.scene);
+    planes::check_map(arguments, &mut files)?;
+    files.reports(to)?;
     arguments.view.check_size()?;
     arguments.view.check_memory(match arguments.method {
         // A depth, and its share of blocks and tiles.

@@ -2,6 +2,7 @@
 
 use super::report;
 use crate::failure::Failure;
+use crate::files::Files;
 use crate::numbers::{count, grouped, point, short};
 use crate::options::ReportOptions;
 use crate::{console, outputs, source};
@@ -23,7 +24,7 @@ pub struct Arguments {
 /// Prints what is in a scene.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let to = arguments.report.json.as_deref();
-    outputs::check_report(to)?;
+    Files::of_scene(&arguments.scene).reports(to)?;
     let scene = source::open(&arguments.scene, arguments.report.verbosity())?;
     match to {
         Some(_) => outputs::write_report(to, &as_json(&scene, &arguments.scene)),

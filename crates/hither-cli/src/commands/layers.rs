@@ -10,6 +10,7 @@ use super::sorting::{LayerOptions, PartOptions, Sorting};
 use crate::console::Verbosity;
 use crate::eye::Eye;
 use crate::failure::Failure;
+use crate::files::Files;
 use crate::numbers::count;
 use crate::options::{ReportOptions, ShadeName, ViewOptions};
 use crate::outputs;
@@ -100,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let to = arguments.report.json.as_deref();
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
     arguments.layers.check()?;
-    check_outputs(arguments)?;
+    check_outputs(arguments, format)?;
     arguments.view.check_size()?;
     // A picture, and what draws and holds one layer.
     arguments.view.check_memory(32)?;
@@ -164,13 +165,24 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     outputs::write_report(to, &json.into())
 }
 
-fn check_outputs(arguments: &Arguments) -> Result<(), Failure> {
-    if let (Some(output), Some(Format::OpenRaster | Format::Exr)) =
-        (&arguments.output, arguments.output.as_deref().map(Format::of).transpose()?)
-    {
-        hither_io::check_writable(output)?;
+/// Refuses what could not be written, or would be written over something else that is named.
+fn check_outputs(arguments: &Arguments, format: Option<Format>) -> Result<(), Failure> {
+    let mut files = Files::of_scene(&arguments.scene);
+    for (_, file) in arguments.replace.iter().filter_map(|replacement| replacement.split_once('=')) {
+        files.reads("--replace", Path::new(file));
     }
-    outputs::check_report(arguments.report.json.as_deref())
+    if let (Some(output), Some(format)) = (&arguments.output, format) {
+        for output in outputs::of_frames(output, arguments.view.frames.as_ref()) {
+            files.takes("-o", &output)?;
+            for beside in write::inside(format, &output).chain(arguments.focus.pictures(format, &output)) {
+                files.takes("-o", &beside)?;
+            }
+            if format != Format::Folder {
+                hither_io::check_writable(&output)?;
+            }
+        }
+    }
+    files.reports(arguments.report.json.as_deref())
 }
 
 /// Parts by name, with the picture that takes the place of their layer.

@@ -5,6 +5,7 @@ use super::sorting::{PartOptions, Sorting};
 use crate::console;
 use crate::eye::Eye;
 use crate::failure::Failure;
+use crate::files::Files;
 use crate::numbers::{count, short};
 use crate::options::{ReportOptions, ViewOptions};
 use crate::outputs;
@@ -46,10 +47,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let verbosity = arguments.report.verbosity();
     let to = arguments.report.json.as_deref();
-    outputs::check_report(to)?;
-    if let Some(dot) = &arguments.dot {
-        hither_io::check_writable(dot)?;
-    }
+    let mut files = Files::of_scene(&arguments.scene);
+    files.writes("--dot", arguments.dot.as_deref(), None)?;
+    files.reports(to)?;
     arguments.view.check_size()?;
     let start = Instant::now();
     let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;

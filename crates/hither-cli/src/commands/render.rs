@@ -6,6 +6,7 @@ use super::report::{self, Seen};
 use crate::console::Verbosity;
 use crate::eye::Eye;
 use crate::failure::Failure;
+use crate::files::Files;
 use crate::numbers::{grouped, short};
 use crate::options::{self, AlgorithmName, ReportOptions, ShadeName, ViewOptions, WorkOptions};
 use crate::outputs::{self, PictureFormat};
@@ -48,7 +49,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let verbosity = arguments.report.verbosity();
     let to = arguments.report.json.as_deref();
     let format = arguments.output.as_deref().map(PictureFormat::of).transpose()?;
-    outputs::check(arguments.output.as_deref(), arguments.view.frames.as_ref(), to)?;
+    let mut files = Files::of_scene(&arguments.scene);
+    files.writes("-o", arguments.output.as_deref(), arguments.view.frames.as_ref())?;
+    files.reports(to)?;
 
     arguments.view.check_size()?;
     // The depth buffer and the frame, and the picture with what its file holds of each pixel.

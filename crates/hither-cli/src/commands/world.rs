@@ -2,6 +2,7 @@
 
 use super::report;
 use crate::failure::Failure;
+use crate::files::Files;
 use crate::numbers::{count, grouped};
 use crate::options::ReportOptions;
 use crate::{console, outputs, source};
@@ -30,8 +31,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::usage(format!("-o {}: give the file the extension .glb", output.display())));
     }
     let (verbosity, to) = (arguments.report.verbosity(), arguments.report.json.as_deref());
-    hither_io::check_writable(output)?;
-    outputs::check_report(to)?;
+    let mut files = Files::default();
+    files.writes("-o", Some(output), None)?;
+    files.reports(to)?;
     let scene = source::generate(name, verbosity)?;
     let spinner = verbosity.spinner(format!("writing {}", output.display()));
     let written = hither_io::write_glb(&scene, output);

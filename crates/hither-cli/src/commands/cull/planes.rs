@@ -2,6 +2,7 @@
 
 use super::{Arguments, Found, MethodName};
 use crate::failure::Failure;
+use crate::files::Files;
 use crate::numbers::{count, grouped};
 use crate::outputs;
 use glam::DAffine3;
@@ -77,20 +78,12 @@ pub fn check_scene(scene: &Scene, source: &str) -> Result<(), Failure> {
 }
 
 /// Refuses a map that could not be written, before any work.
-pub fn check_map(arguments: &Arguments) -> Result<(), Failure> {
+pub fn check_map(arguments: &Arguments, files: &mut Files) -> Result<(), Failure> {
     let Some(map) = &arguments.planes.map else { return Ok(()) };
     if !outputs::has_extension(map, "svg") {
         return Err(Failure::usage(format!("--map {}: give the file the extension .svg", map.display())));
     }
-    match &arguments.view.frames {
-        None => hither_io::check_writable(map)?,
-        Some(frames) => {
-            for frame in frames.clone().take(1000) {
-                hither_io::check_writable(&outputs::numbered(map, frame))?;
-            }
-        }
-    }
-    Ok(())
+    files.writes("--map", Some(map), arguments.view.frames.as_ref())
 }
 
 /// The method with what it keeps from frame to frame.

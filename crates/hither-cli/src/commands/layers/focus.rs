@@ -1,6 +1,7 @@
 //! Depth of field: layers blurred and composited, beside the blurred single picture and the truth.
 
 use super::Taken;
+use super::write::Format;
 use crate::console::Verbosity;
 use crate::failure::Failure;
 use crate::numbers::short;
@@ -29,6 +30,32 @@ pub struct FocusOptions {
     lens_samples: Option<u32>,
 }
 
+/// Names of the pictures: through the lens, and what it is compared with.
+const PICTURE: &str = "focus";
+const SINGLE: &str = "focus-single";
+const TRUTH: &str = "focus-truth";
+
+impl FocusOptions {
+    /// The files that are written for the layers in `output`.
+    pub fn pictures(&self, format: Format, output: &Path) -> impl Iterator<Item = PathBuf> {
+        let names: &[&str] = match (self.focus, self.lens_samples) {
+            (None, _) => &[],
+            (Some(_), None) => &[PICTURE],
+            (Some(_), Some(_)) => &[PICTURE, SINGLE, TRUTH],
+        };
+        names.iter().map(move |name| beside(output, format == Format::Folder, name))
+    }
+}
+
+/// The file of picture `what`: in the folder of the layers, or beside the file that they are in.
+fn beside(output: &Path, is_folder: bool, what: &str) -> PathBuf {
+    if is_folder {
+        return output.join(format!("{what}.png"));
+    }
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+    output.with_file_name(format!("{stem}-{what}.png"))
+}
+
 /// Makes the pictures that are asked for; `None` if there is no lens.
 pub fn run(
     options: &FocusOptions,
@@ -51,7 +78,7 @@ pub fn run(
     let size = (view.width, view.height);
     let blurred: Vec<Sprite> = taken.layers.iter().map(|l| blur_layer(&l.painted, view, &lens)).collect();
     let layered = taken.program.run(size, |l| (!taken.layers[l as usize].out).then(|| &blurred[l as usize]));
-    write(output, "focus", &layered, verbosity)?;
+    write(output, PICTURE, &layered, verbosity)?;
     let Some(samples) = options.lens_samples else { return Ok(Some(json!({ "focus": focus }))) };
     let draw = |painter: &mut LayerPainter, view: &View| {
         painter.paint_all(view, paint).map_err(|e| Failure::work(e.to_string()))
@@ -67,8 +94,8 @@ pub fn run(
         pictures.push((Canvas { width: size.0, height: size.1, pixels }, *shift));
     }
     let truth = accumulate(size, pictures.into_iter());
-    write(output, "focus-single", &single, verbosity)?;
-    write(output, "focus-truth", &truth, verbosity)?;
+    write(output, SINGLE, &single, verbosity)?;
+    write(output, TRUTH, &truth, verbosity)?;
     let errors = [&layered, &single, &sharp].map(|c| rms_difference(c, &truth));
     verbosity.note(&format!(
         "root mean square error against {} lens samples: layers {}, single picture {}, no blur {}",
@@ -88,13 +115,7 @@ pub fn run(
 
 fn write(output: Option<&Path>, what: &str, picture: &Canvas, verbosity: Verbosity) -> Result<(), Failure> {
     let Some(output) = output else { return Ok(()) };
-    let path: PathBuf = match output.is_dir() {
-        true => output.join(format!("{what}.png")),
-        false => {
-            let stem = output.file_stem().unwrap_or_default().to_string_lossy();
-            output.with_file_name(format!("{stem}-{what}.png"))
-        }
-    };
+    let path = beside(output, output.is_dir(), what);
     hither_io::write_png(&path, picture.width, picture.height, &picture.pixels)?;
     verbosity.note(&format!("wrote {}", path.display()));
     Ok(())

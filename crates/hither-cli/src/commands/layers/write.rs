@@ -7,7 +7,7 @@ use crate::outputs;
 use hither::layers::{Operation, Program, Register, Source, Sprite};
 use hither_io::LayerPicture;
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +34,17 @@ impl Format {
             Err(Failure::usage(format!("-o {}: {what}", path.display())))
         }
     }
+}
+
+/// What a folder holds besides its layers.
+const COMPOSITE: &str = "composite.png";
+const EXPRESSION: &str = "expression.txt";
+const PROGRAM: &str = "program.json";
+
+/// The files in `output`, if it is a folder, that it has whatever the layers are.
+pub fn inside(format: Format, output: &Path) -> impl Iterator<Item = PathBuf> {
+    let names = if format == Format::Folder { &[COMPOSITE, EXPRESSION, PROGRAM][..] } else { &[] };
+    names.iter().map(move |name| output.join(name))
 }
 
 /// A program as a list of `{ op, register, layer }`; `layer` is null where the source is the register to the left.
@@ -145,8 +156,8 @@ fn folder(
         )?;
         files.push(file);
     }
-    hither_io::write_png(&path.join("composite.png"), width, height, &taken.composite.pixels)?;
-    for (name, content) in [("expression.txt", expression), ("program.json", program)] {
+    hither_io::write_png(&path.join(COMPOSITE), width, height, &taken.composite.pixels)?;
+    for (name, content) in [(EXPRESSION, expression), (PROGRAM, program)] {
         hither_io::write_whole(&path.join(name), |file| file.write_all(content.as_bytes()))?;
     }
     Ok(files)

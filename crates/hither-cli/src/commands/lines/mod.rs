@@ -7,6 +7,7 @@ pub use arguments::Arguments;
 
 use super::report;
 use crate::failure::Failure;
+use crate::files::Files;
 use crate::numbers::{grouped, short};
 use crate::outputs::{self, has_extension};
 use crate::source;
@@ -24,7 +25,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let verbosity = arguments.report.verbosity();
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
     let report = arguments.report.json.as_deref();
-    outputs::check(arguments.output.as_deref(), arguments.view.frames.as_ref(), report)?;
+    let mut files = Files::of_scene(&arguments.scene);
+    files.writes("-o", arguments.output.as_deref(), arguments.view.frames.as_ref())?;
+    files.reports(report)?;
     if arguments.views.is_none() && !arguments.parallel {
         arguments.view.check_size()?;
     }
