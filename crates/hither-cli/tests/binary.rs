@@ -1,6 +1,6 @@
 //! The binary as a user meets it: exit codes, one clear line for each mistake, reports, and no partial files.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -389,6 +389,62 @@ fn a_camera_that_cannot_be_used_is_named() {
         );
     }
     done(&["render", &scene, "-o", &picture, "--size", "8x8", "--camera", "two"]);
+}
+
+/// A triangle below ten nodes, each of which grows to 10³⁸ times its size within a second, and a camera whose planes are
+/// a thousand kilometres apart.
+fn write_growing(folder: &Folder) -> String {
+    let numbers = [0f32, 0., 0., 1., 0., 0., 0., 1., 0., 0., 1., 1., 1., 1., 1e38, 1e38, 1e38];
+    fs::write(folder.0.join("grows.bin"), numbers.map(f32::to_le_bytes).as_flattened()).unwrap();
+    let mut nodes: Vec<Value> =
+        (1..10).map(|child| json!({ "name": "grows", "children": [child] })).collect();
+    nodes.push(json!({ "mesh": 0 }));
+    nodes.push(json!({ "camera": 0, "translation": [0, 0, 5] }));
+    let channel = |node: usize| json!({ "sampler": 0, "target": { "node": node, "path": "scale" } });
+    let view = |from: usize, length: usize| json!({ "buffer": 0, "byteOffset": from, "byteLength": length });
+    let accessor = |view: usize, count: usize, kind: &str| {
+        json!({
+            "bufferView": view, "componentType": 5126, "count": count, "type": kind,
+        })
+    };
+    let document = json!({
+        "asset": { "version": "2.0" },
+        "scenes": [{ "nodes": [0, 10] }],
+        "nodes": nodes,
+        "cameras": [{ "type": "orthographic",
+            "orthographic": { "xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 1e6 } }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+        "animations": [{ "channels": (0..9).map(channel).collect::<Vec<_>>(),
+            "samplers": [{ "input": 1, "output": 2 }] }],
+        "accessors": [accessor(0, 3, "VEC3"), accessor(1, 2, "SCALAR"), accessor(2, 2, "VEC3")],
+        "bufferViews": [view(0, 36), view(36, 8), view(44, 24)],
+        "buffers": [{ "byteLength": 68, "uri": "grows.bin" }],
+    });
+    fs::write(folder.0.join("grows.gltf"), document.to_string()).unwrap();
+    folder.path("grows.gltf")
+}
+
+#[test]
+fn places_beyond_all_numbers_are_refused_and_planes_too_far_apart_told() {
+    let folder = Folder::new("beyond");
+    let (scene, picture) = (write_growing(&folder), folder.path("x.png"));
+    let words = ["grows.gltf: node 8 \"grows\": at 1 s its place in the world is not a finite number"];
+    for arguments in [
+        &["render", &scene, "-o", &picture][..],
+        &["cull", &scene],
+        &["cull", &scene, "--method", "planes"],
+        &["order", &scene],
+        &["lines", &scene, "-o", &folder.path("x.svg")],
+        &["layers", &scene, "-o", &folder.path("x.ora")],
+    ] {
+        refused(&[arguments, &["--time", "1", "--size", "8x8"]].concat(), 1, &words);
+    }
+    assert_eq!(folder.names(), ["grows.bin", "grows.gltf"]);
+    let told = stderr(&done(&["render", &scene, "-o", &picture, "--size", "8x8"]));
+    assert!(
+        told.contains("camera 0: its planes are so far apart that depths within 6.0e-2 m are one"),
+        "{told}"
+    );
 }
 
 #[test]

@@ -77,6 +77,10 @@
 //! it is within ρ pixels of b on e's image, where the patch covers everything at least once and lies wholly
 //! before b. Going from b towards e', x' begins behind the patch and ends before it, and all the while stays
 //! where N ≥ 1: it crosses the patch. Motion of an occluder by m adds m to r; boxes are widened by 2m.
+//!
+//! The near plane, and an orthographic view's far one, go with the eye. A patch of which some is within r of the near
+//! plane is not drawn, for e' may have that behind it; what lies before the near plane or beyond the far one is outside
+//! only if it does so by more than r.
 
 mod ask;
 mod clip;
