@@ -36,10 +36,10 @@ const PICTURES: [u64; 6] = [
 const BUFFERS: [u64; 6] = [
     0x9c4c_a469_21df_ef84,
     0x9fdb_c1ea_234d_142d,
-    0x1815_e410_3bca_81e3,
+    0xe6d8_307d_5fa1_8e81,
     0x5fca_95ef_bb14_785f,
     0xc7a0_695f_43b9_588c,
-    0x2c7f_e1e3_ff83_33b2,
+    0x8c2c_78f3_85e8_1f50,
 ];
 
 /// Depths of sampled buffers, which occluder was drawn, and their verdicts.
