@@ -587,7 +587,7 @@ fn into_joint<S: Simd, const N: usize>(
     let touched = touched & around;
     let old = f32x16::from_slice(simd, &joint.depth.0);
     touched.select(old.min(place.depth(simd, face, plane)), old).store_slice(&mut joint.depth.0);
-    for y in place.rows[0]..(place.rows[1]) + 1 {
+    for y in place.rows[0]..place.rows[1] + 1 {
         let mut centre = zero;
         for e in &e {
             centre |= *e;
