@@ -1,4 +1,5 @@
-//! What is open on a walk, the nearest first.
+//! What is open on a walk, the nearest first. Exactly: it holds thousands, where the renderer's queue holds hundreds of
+//! thousands and is content with about the nearest.
 
 use std::collections::BinaryHeap;
 
