@@ -1,7 +1,7 @@
 //! The files that a command line names: none that is written takes the place of another, or of what is read.
 //!
-//! All is refused before anything is read. What a model's file names in turn, its textures and buffers, is not known
-//! then, and not looked at.
+//! All is refused before anything is read, but for what a model's file names in turn, its textures and buffers: that is
+//! known when it is read, and refused then.
 
 use crate::failure::Failure;
 use crate::{outputs, source};
@@ -9,10 +9,18 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Files by their real path, and what the command line calls each.
+/// A file that the command line names.
+struct Named {
+    /// What the command line calls it.
+    what: String,
+    /// It is going to be written.
+    written: bool,
+}
+
+/// Files by their real path.
 #[derive(Default)]
 pub struct Files {
-    named: HashMap<PathBuf, String>,
+    named: HashMap<PathBuf, Named>,
 }
 
 impl Files {
@@ -27,15 +35,16 @@ impl Files {
 
     /// Option `what` reads `path`; others may, too.
     pub fn reads(&mut self, what: &str, path: &Path) {
-        self.named.extend(hither_io::real_path(path).map(|real| (real, what.to_owned())));
+        let named = Named { what: what.to_owned(), written: false };
+        self.named.extend(hither_io::real_path(path).map(|real| (real, named)));
     }
 
     /// Option `what` has `path` for itself.
     pub fn takes(&mut self, what: &str, path: &Path) -> Result<(), Failure> {
         let Some(real) = hither_io::real_path(path) else { return Ok(()) };
-        match self.named.insert(real, what.to_owned()) {
+        match self.named.insert(real, Named { what: what.to_owned(), written: true }) {
             None => Ok(()),
-            Some(other) => {
+            Some(Named { what: other, .. }) => {
                 let why = format!("this is the file of {other}, too, and one would be lost; name another");
                 Err(Failure::work(format!("{what} {}: {why}", path.display())))
             }
@@ -55,6 +64,15 @@ impl Files {
             hither_io::check_writable(&path)?;
         }
         Ok(())
+    }
+
+    /// Refuses files that are going to be written and that the scene was read from.
+    pub fn spare(&self, read: &[PathBuf]) -> Result<(), Failure> {
+        let written = |real: PathBuf| self.named.get(&real).filter(|named| named.written);
+        let lost = read.iter().find_map(|path| Some((path, written(hither_io::real_path(path)?)?)));
+        let Some((path, Named { what, .. })) = lost else { return Ok(()) };
+        let why = "the scene is read from this file, too, and it would be lost; name another";
+        Err(Failure::work(format!("{what} {}: {why}", path.display())))
     }
 
     /// The report goes to `to`, if one is asked for; `-` is standard output.

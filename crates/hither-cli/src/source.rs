@@ -2,6 +2,7 @@
 
 use crate::console::Verbosity;
 use crate::failure::Failure;
+use crate::files::Files;
 use crate::numbers::count;
 use hither::scene::Scene;
 use std::path::Path;
@@ -14,8 +15,9 @@ pub fn file(name: &str) -> Option<&Path> {
     (!name.starts_with(WORLD)).then(|| Path::new(name))
 }
 
-/// Reads or generates the scene called `name`, and prints what was odd about its file.
-pub fn open(name: &str, verbosity: Verbosity) -> Result<Scene, Failure> {
+/// Reads or generates the scene called `name`, and prints what was odd about its file. Refused where one of `files` that
+/// are going to be written is one that the scene names.
+pub fn open(name: &str, files: &Files, verbosity: Verbosity) -> Result<Scene, Failure> {
     if let Some(spec) = name.strip_prefix(WORLD) {
         return generate(spec, verbosity);
     }
@@ -29,6 +31,7 @@ pub fn open(name: &str, verbosity: Verbosity) -> Result<Scene, Failure> {
     let loaded = hither_io::read(path);
     spinner.finish_and_clear();
     let loaded = loaded.map_err(|error| unknown(name, error))?;
+    files.spare(&loaded.companions)?;
     for diagnostic in &loaded.diagnostics {
         verbosity.warning(&format!("{name}: {diagnostic}"));
     }
@@ -36,8 +39,8 @@ pub fn open(name: &str, verbosity: Verbosity) -> Result<Scene, Failure> {
 }
 
 /// As [`open`], for what draws or sorts surfaces alone: lines that the scene has are told of as left out.
-pub fn open_surfaces(name: &str, verbosity: Verbosity) -> Result<Scene, Failure> {
-    let scene = open(name, verbosity)?;
+pub fn open_surfaces(name: &str, files: &Files, verbosity: Verbosity) -> Result<Scene, Failure> {
+    let scene = open(name, files, verbosity)?;
     let lines: u64 = scene.meshes.iter().map(|mesh| mesh.lines.len() as u64).sum();
     if lines > 0 {
         let (lines, verb) = (count(lines, "line"), if lines == 1 { "is" } else { "are" });

@@ -195,6 +195,22 @@ fn no_file_that_is_named_is_written_over_another() {
         refused(&arguments, 1, &[&format!(": this is the file of {named}, too, and one would be lost")]);
         assert_eq!((folder.names(), fs::read(scene).unwrap()), before, "{command}");
     }
+    // What the model names is known when it is read.
+    fs::write(folder.0.join("m.obj"), "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
+        .unwrap();
+    fs::write(folder.0.join("m.mtl"), "newmtl a\nKd 1 0 0\n").unwrap();
+    let (model, materials) = (folder.path("m.obj"), folder.path("m.mtl"));
+    for arguments in [
+        vec!["info"],
+        vec!["render", "-o", &folder.path("y.png")],
+        vec!["lines"],
+        vec!["order"],
+        vec!["cull"],
+    ] {
+        let arguments = [&arguments, &[model.as_str(), "--json", &materials][..]].concat();
+        refused(&arguments, 1, &["--json", "the scene is read from this file, too, and it would be lost"]);
+        assert!(!folder.0.join("y.png").exists());
+    }
     // What holds nothing can be named as often as one likes.
     if cfg!(unix) {
         done(&["order", scene, "--dot", "/dev/null", "--json", "/dev/null"]);

@@ -59,7 +59,12 @@ pub fn real_path(path: &Path) -> Option<PathBuf> {
     match fs::metadata(path) {
         Ok(found) if is_stream_name(path) || !(found.is_file() || found.is_dir()) => None,
         Ok(_) => real(path),
-        Err(_) => Some(real(folder_of(path))?.join(path.file_name()?)),
+        Err(_) => match fs::read_link(path) {
+            Ok(link) if fs::metadata(path).is_err_and(|e| e.kind() == ErrorKind::NotFound) => {
+                real_path(&folder_of(path).join(link))
+            }
+            _ => Some(real(folder_of(path))?.join(path.file_name()?)),
+        },
     }
 }
 
@@ -84,6 +89,10 @@ fn destination(path: &Path) -> io::Result<Destination> {
         Err(missing) if missing.kind() == ErrorKind::NotFound => {
             if path.file_name().is_none() || path.as_os_str().to_string_lossy().ends_with('/') {
                 return Err(because(ErrorKind::InvalidInput, "the name of a file is missing"));
+            }
+            if let Ok(link) = fs::read_link(path) {
+                // It leads to a file that is not there yet. Links that lead in a circle are another error.
+                return destination(&folder_of(path).join(link));
             }
             let folder = folder_of(path);
             match fs::metadata(folder) {
@@ -247,6 +256,19 @@ mod tests {
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read(&real).unwrap(), b"new");
         assert_eq!(fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o640);
+        // A link to what is not there yet stays one, too.
+        let (new, early) = (folder.0.join("new"), folder.0.join("early"));
+        std::os::unix::fs::symlink("new", &early).unwrap();
+        assert_eq!(real_path(&early), real_path(&new));
+        check_writable(&early).unwrap();
+        write_whole(&early, |w| w.write_all(b"made")).unwrap();
+        assert!(fs::symlink_metadata(&early).unwrap().is_symlink());
+        assert_eq!(fs::read(&new).unwrap(), b"made");
+        std::os::unix::fs::symlink("nowhere/new", folder.0.join("lost")).unwrap();
+        assert!(check_writable(&folder.0.join("lost")).unwrap_err().to_string().contains("no folder"));
+        std::os::unix::fs::symlink("circle", folder.0.join("circle")).unwrap();
+        assert!(check_writable(&folder.0.join("circle")).is_err());
+        assert!(real_path(&folder.0.join("circle")).is_some());
         check_writable(Path::new("/dev/null")).unwrap();
         write_whole(Path::new("/dev/null"), |w| w.write_all(b"gone")).unwrap();
     }

@@ -1,6 +1,7 @@
 //! The other files that a model names: only those in the model's own folder are ever opened.
 
 use crate::text::one_line;
+use std::cell::RefCell;
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -29,12 +30,19 @@ impl<F: Fn(&str) -> Result<Vec<u8>, String>> Companions for F {
 #[derive(Clone, Debug)]
 pub struct ModelFolder {
     model: PathBuf,
+    /// The files that were read.
+    opened: RefCell<Vec<PathBuf>>,
 }
 
 impl ModelFolder {
     /// The folder of the model file at `model`.
     pub fn of(model: &Path) -> ModelFolder {
-        ModelFolder { model: model.to_owned() }
+        ModelFolder { model: model.to_owned(), opened: RefCell::default() }
+    }
+
+    /// The files that were read, in the order in which they were.
+    pub fn into_opened(self) -> Vec<PathBuf> {
+        self.opened.into_inner()
     }
 
     fn path(&self) -> &Path {
@@ -99,6 +107,7 @@ impl Companions for ModelFolder {
         }
         let mut bytes = Vec::new();
         File::open(&path).and_then(|mut file| file.read_to_end(&mut bytes)).map_err(failed)?;
+        self.opened.borrow_mut().push(path);
         Ok(bytes)
     }
 
@@ -151,6 +160,7 @@ mod tests {
         assert_ne!(folder.identity("none"), folder.identity("none at all"));
         let told = folder.load("a\nb\u{1b}[31m.bin").unwrap_err();
         assert!(told.contains("a\\nb\\u{1b}[31m.bin") && !told.contains(char::is_control), "{told:?}");
+        assert_eq!(folder.into_opened(), [top.join("inside/near")]);
         fs::remove_dir_all(&top).unwrap();
     }
 }

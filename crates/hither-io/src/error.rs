@@ -58,13 +58,15 @@ pub struct Loaded {
     pub scene: Scene,
     /// Oddities, each once.
     pub diagnostics: Vec<Diagnostic>,
+    /// The files that it names and that were read: buffers, materials, textures.
+    pub companions: Vec<PathBuf>,
 }
 
 impl Loaded {
     /// A scene read from `path`, checked.
     pub(crate) fn checked(path: &Path, scene: Scene, diagnostics: Vec<Diagnostic>) -> Result<Loaded, Error> {
         match scene.validate() {
-            Ok(()) => Ok(Loaded { scene, diagnostics }),
+            Ok(()) => Ok(Loaded { scene, diagnostics, companions: Vec::new() }),
             Err(fault) => Err(Error::Malformed { path: path.to_owned(), message: fault.to_string() }),
         }
     }

@@ -90,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         // The depth buffer with ids, and the frame.
         MethodName::Exact => 22,
     })?;
-    let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
+    let mut scene = source::open_surfaces(&arguments.scene, &files, verbosity)?;
     if arguments.method == MethodName::Planes {
         planes::check_scene(&scene, &arguments.scene)?;
     }

@@ -7,6 +7,7 @@ mod summary;
 use super::report::Seen;
 use crate::console::{self, Verbosity};
 use crate::failure::Failure;
+use crate::files::Files;
 use crate::numbers::grouped;
 use crate::source;
 use hither::conventions::View;
@@ -56,7 +57,7 @@ pub fn run() -> Result<(), Failure> {
     })?;
     hither_io::check_writable(&folder.join("walk-0000.png"))?;
 
-    let scene = source::open(WORLD, Verbosity::Normal)?;
+    let scene = source::open(WORLD, &Files::default(), Verbosity::Normal)?;
     let start = Instant::now();
     let index = SceneIndex::build(scene, &IndexOptions::default());
     let mut tour = Tour::new(index)?;

@@ -24,8 +24,9 @@ pub struct Arguments {
 /// Prints what is in a scene.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let to = arguments.report.json.as_deref();
-    Files::of_scene(&arguments.scene).reports(to)?;
-    let scene = source::open(&arguments.scene, arguments.report.verbosity())?;
+    let mut files = Files::of_scene(&arguments.scene);
+    files.reports(to)?;
+    let scene = source::open(&arguments.scene, &files, arguments.report.verbosity())?;
     match to {
         Some(_) => outputs::write_report(to, &as_json(&scene, &arguments.scene)),
         None => console::print(&as_text(&scene, &arguments.scene)),

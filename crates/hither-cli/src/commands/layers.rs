@@ -101,11 +101,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let to = arguments.report.json.as_deref();
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
     arguments.layers.check()?;
-    check_outputs(arguments, format)?;
+    let files = check_outputs(arguments, format)?;
     arguments.view.check_size()?;
     // A picture, and what draws and holds one layer.
     arguments.view.check_memory(32)?;
-    let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
+    let mut scene = source::open_surfaces(&arguments.scene, &files, verbosity)?;
     let prepared = arguments.parts.prepare(&mut scene, &arguments.scene)?;
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     timeline.pose_scene(&mut scene, timeline.frames.start)?;
@@ -166,7 +166,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Refuses what could not be written, or would be written over something else that is named.
-fn check_outputs(arguments: &Arguments, format: Option<Format>) -> Result<(), Failure> {
+fn check_outputs(arguments: &Arguments, format: Option<Format>) -> Result<Files, Failure> {
     let mut files = Files::of_scene(&arguments.scene);
     for (_, file) in arguments.replace.iter().filter_map(|replacement| replacement.split_once('=')) {
         files.reads("--replace", Path::new(file));
@@ -182,7 +182,8 @@ fn check_outputs(arguments: &Arguments, format: Option<Format>) -> Result<(), Fa
             }
         }
     }
-    files.reports(arguments.report.json.as_deref())
+    files.reports(arguments.report.json.as_deref())?;
+    Ok(files)
 }
 
 /// Parts by name, with the picture that takes the place of their layer.

@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     files.reports(to)?;
     arguments.view.check_size()?;
     let start = Instant::now();
-    let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
+    let mut scene = source::open_surfaces(&arguments.scene, &files, verbosity)?;
     let prepared = arguments.parts.prepare(&mut scene, &arguments.scene)?;
     let read_time = start.elapsed();
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;

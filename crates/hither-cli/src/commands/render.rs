@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // The depth buffer and the frame, and the picture with what its file holds of each pixel.
     arguments.view.check_memory(if format == Some(PictureFormat::Exr) { 66 } else { 26 })?;
     let start = Instant::now();
-    let mut scene = source::open_surfaces(&arguments.scene, verbosity)?;
+    let mut scene = source::open_surfaces(&arguments.scene, &files, verbosity)?;
     let read_time = start.elapsed();
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     timeline.pose_first(&mut scene)?;

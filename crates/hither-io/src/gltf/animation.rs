@@ -1,6 +1,6 @@
 //! Animations of the scene's nodes: translation, rotation and scale, in all three interpolations.
 //!
-//! A channel that cannot be played is told of and left out; one of a node outside the scene is left out.
+//! A channel that cannot be played is told of and left out; one of a node outside the scene, or of no node, is left out.
 
 use super::accessor::Elements;
 use super::buffers::Buffers;
@@ -17,9 +17,14 @@ pub(super) fn read(buffers: &Buffers, hierarchy: &Hierarchy, oddities: &mut Oddi
         let mut channels = Vec::new();
         for (c, channel) in source.channels.iter().enumerate() {
             let here = || format!("{}, channel {c}", part("animation", index, &source.name));
-            let Some(node) = channel.target.node.and_then(|n| *hierarchy.place.get(n.at())?) else {
+            let Some(target) = channel.target.node else { continue };
+            let Some(place) = hierarchy.place.get(target.at()) else {
+                let there = hierarchy.place.len();
+                let why = format!("it moves node {}, but there are {there}; it is left out", target.0);
+                oddities.note(here(), why);
                 continue;
             };
+            let Some(node) = *place else { continue };
             let Some(property) = property(&channel.target.path) else {
                 let path = quoted(&channel.target.path);
                 oddities.note(here(), format!("it moves {path}, which is left out"));

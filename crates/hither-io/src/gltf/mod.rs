@@ -57,7 +57,9 @@ const DRACO: &str = "KHR_draco_mesh_compression";
 /// Errors: the file cannot be read, it breaks glTF's rules, or it needs what is not supported.
 pub fn read(path: &Path) -> Result<Loaded, Error> {
     let bytes = input::read(path)?;
-    from_bytes(path, &bytes, &ModelFolder::of(path))
+    let folder = ModelFolder::of(path);
+    let loaded = from_bytes(path, &bytes, &folder)?;
+    Ok(Loaded { companions: folder.into_opened(), ..loaded })
 }
 
 /// Reads a `.gltf` or `.glb` file's content. `path` is for messages; files that it names come from
@@ -77,7 +79,10 @@ fn read_parts(bytes: &[u8], named_glb: bool, companions: &dyn Companions) -> Res
     let buffers = Buffers::load(&document, bytes, parts.bin, companions)?;
     let scene = assemble(&buffers, companions, &mut oddities)?;
     match scene.validate() {
-        Ok(()) => Ok(Loaded { scene, diagnostics: oddities.into_diagnostics() }),
+        Ok(()) => {
+            let diagnostics = oddities.into_diagnostics();
+            Ok(Loaded { scene, diagnostics, companions: Vec::new() })
+        }
         Err(e) => malformed(one_line(&e.to_string())),
     }
 }

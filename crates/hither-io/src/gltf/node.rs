@@ -143,6 +143,10 @@ fn transform(source: &json::Node, here: &dyn Fn() -> String, oddities: &mut Oddi
         if [matrix[3], matrix[7], matrix[11], matrix[15]] != [0.0, 0.0, 0.0, 1.0] {
             oddities.note(here(), "its matrix is not affine; its last row is ignored");
         }
+        if source.translation.is_some() || source.rotation.is_some() || source.scale.is_some() {
+            oddities
+                .note(here(), "has a matrix besides its translation, rotation or scale; the matrix counts");
+        }
         return Transform::Affine(DAffine3::from_mat4(DMat4::from_cols_array(matrix)));
     }
     let rotation = source.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);

@@ -32,7 +32,9 @@ use std::path::Path;
 /// Reads the OBJ file at `path`, and the material libraries and textures that it names from its folder.
 pub fn read(path: &Path) -> Result<Loaded, Error> {
     let bytes = input::read(path)?;
-    from_bytes(path, &bytes, &ModelFolder::of(path))
+    let folder = ModelFolder::of(path);
+    let loaded = from_bytes(path, &bytes, &folder)?;
+    Ok(Loaded { companions: folder.into_opened(), ..loaded })
 }
 
 /// Reads an OBJ file from memory. `path` names it in messages and gives the scene its name; nothing is opened

@@ -325,14 +325,16 @@ mod tests {
     fn text_is_read_as_far_as_it_goes() {
         let loaded = read(b"solid\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\n\
             endfacet\nfacet\nouter loop\nvertex 0 0 0\nvertex x 0 0\nvertex 1 1 1\nendloop\nendfacet\nwhat 1\nfacet\n\
-            outer loop\nvertex 0 0 0\nendloop\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1")
+            outer loop\nvertex 0 0 0\nendloop\nfacet normal 0 0 1\nendfacet\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1")
         .unwrap();
         assert_eq!(loaded.scene.meshes[0].triangles, [[0, 1, 2], [0, 2, 3]]);
         let told = messages(&loaded);
-        for part in ["no number", "\"what\"", "fewer than three corners", "ends within a solid"] {
+        for part in ["no number", "\"what\"", "fewer than three corners", "no corners", "ends within a solid"]
+        {
             assert!(told.iter().any(|m| m.contains(part)), "{part} in {told:#?}");
         }
         assert!(read(b"solid\nendsolid\n").unwrap().scene.bounds().is_none());
+        assert!(refusal(b"solid\nfacet\nouter loop\nendloop\nendfacet\nendsolid\n").contains("no corners"));
         assert!(refusal(b"solid as a rock\nis not a model\n").contains("no facet"));
     }
 

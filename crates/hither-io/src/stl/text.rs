@@ -20,15 +20,18 @@ pub(super) fn read(bytes: &[u8], scene: &mut Scene, oddities: &mut Oddities) -> 
         let is = |name: &str| word.eq_ignore_ascii_case(name.as_bytes());
         if is("vertex") {
             reader.vertex(rest);
-        } else if is("facet") || is("endfacet") || is("outer") || is("endloop") {
-            reader.facets += u64::from(is("facet"));
+        } else if is("outer") || is("endloop") {
             reader.close_loop(number, &mut odd);
+        } else if is("facet") || is("endfacet") {
+            reader.close_facet(number, &mut odd);
+            reader.is_bare = is("facet");
+            reader.facets += u64::from(is("facet"));
         } else if is("solid") {
             reader.end_solid(scene);
             reader.solid.name = String::from_utf8_lossy(rest.trim_ascii()).into_owned();
             reader.is_open = true;
         } else if is("endsolid") {
-            reader.close_loop(number, &mut odd);
+            reader.close_facet(number, &mut odd);
             reader.end_solid(scene);
         } else {
             odd.oddities.note(
@@ -42,7 +45,7 @@ pub(super) fn read(bytes: &[u8], scene: &mut Scene, oddities: &mut Oddities) -> 
         return Err("it begins with \"solid\" but holds no facet; is it damaged, or another format?".into());
     }
     if reader.is_open {
-        if !reader.outline.is_empty() {
+        if reader.is_bare || !reader.outline.is_empty() {
             odd.losses.lost(number, "the file ends within a facet");
         }
         odd.note(number, "the file ends within a solid; what was complete is read");
@@ -56,6 +59,8 @@ struct Reader {
     solid: Solid,
     is_open: bool,
     facets: u64,
+    /// A facet has begun, and no corner of it was met.
+    is_bare: bool,
     /// Corners since the last loop began.
     outline: Vec<Vec3>,
     triangulator: Triangulator,
@@ -70,6 +75,14 @@ impl Reader {
             position[axis] = value;
         }
         self.outline.push(position);
+        self.is_bare = false;
+    }
+
+    fn close_facet(&mut self, number: u64, odd: &mut Odd) {
+        self.close_loop(number, odd);
+        if std::mem::take(&mut self.is_bare) {
+            odd.lose(number, "a facet has no corners and is left out");
+        }
     }
 
     /// Makes triangles of the corners that were given, if any.
@@ -107,7 +120,7 @@ impl Reader {
 
     fn end_solid(&mut self, scene: &mut Scene) {
         self.outline.clear();
-        self.is_open = false;
+        (self.is_open, self.is_bare) = (false, false);
         std::mem::take(&mut self.solid).finish(scene);
     }
 }

@@ -35,7 +35,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let _ = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.into()).build_global();
 
     let start = Instant::now();
-    let mut scene = source::open(&arguments.scene, verbosity)?;
+    let mut scene = source::open(&arguments.scene, &files, verbosity)?;
     check_size(&scene, &arguments.scene)?;
     let read_time = start.elapsed();
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;

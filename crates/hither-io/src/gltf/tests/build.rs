@@ -115,7 +115,7 @@ impl Build {
     /// The scene of a file with nothing odd.
     #[track_caller]
     pub(super) fn scene(&self) -> Scene {
-        let Loaded { scene, diagnostics } = self.read().unwrap();
+        let Loaded { scene, diagnostics, .. } = self.read().unwrap();
         assert_eq!(diagnostics, []);
         scene
     }
@@ -129,7 +129,7 @@ impl Build {
 
     #[track_caller]
     pub(super) fn odd_scene(&self) -> (Scene, Vec<String>) {
-        let Loaded { scene, diagnostics } = self.read().unwrap();
+        let Loaded { scene, diagnostics, .. } = self.read().unwrap();
         (scene, diagnostics.iter().map(Diagnostic::to_string).collect())
     }
 }

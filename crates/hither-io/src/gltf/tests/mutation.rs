@@ -61,7 +61,7 @@ fn rich() -> Build {
 #[track_caller]
 fn check(bytes: &[u8]) {
     match read(bytes) {
-        Ok(Loaded { scene, diagnostics }) => {
+        Ok(Loaded { scene, diagnostics, .. }) => {
             scene.validate().unwrap();
             assert!(diagnostics.iter().all(|d| !d.to_string().contains('\n')));
         }

@@ -26,7 +26,7 @@ impl Drop for Scratch {
 fn again(scene: &Scene, name: &str) -> Scene {
     let file = Scratch::new(name);
     write_glb(scene, &file.0).unwrap();
-    let Loaded { scene, diagnostics } = gltf::read(&file.0).unwrap();
+    let Loaded { scene, diagnostics, .. } = gltf::read(&file.0).unwrap();
     assert_eq!(diagnostics, []);
     scene
 }

@@ -67,6 +67,7 @@ fn transforms_as_matrix_and_as_parts() {
     build.root(json!({ "matrix": columns }));
     build.root(json!({ "rotation": [0.0, 0.0, 3.0, 3.0], "scale": [1, 0, -1], "translation": [1, 2, 3] }));
     build.root(json!({ "rotation": [0, 0, 0, 0] }));
+    build.root(json!({ "matrix": columns, "scale": [7, 7, 7] }));
     let (scene, odd) = build.odd_scene();
     let nodes = &scene.root_group().nodes;
     let matrix = nodes[0].local.matrix();
@@ -74,7 +75,9 @@ fn transforms_as_matrix_and_as_parts() {
     let Transform::Trs { rotation, scale, .. } = nodes[1].local else { panic!("it was given in parts") };
     assert!((rotation * DVec3::X - DVec3::Y).length() < 1e-12 && scale == DVec3::new(1.0, 0.0, -1.0));
     assert_eq!(nodes[2].local.matrix(), DAffine3::IDENTITY);
-    assert_eq!(odd, ["node 2: its rotation is no unit quaternion; it is ignored"]);
+    assert_eq!(nodes[3].local, nodes[0].local);
+    let both = "node 3: has a matrix besides its translation, rotation or scale; the matrix counts";
+    assert_eq!(odd, ["node 2: its rotation is no unit quaternion; it is ignored", both]);
 }
 
 #[test]
@@ -155,6 +158,7 @@ fn channels_of_every_kind() {
         channel(0, 0, "weights"),
         channel(0, fixed, "translation"),
         channel(9, 0, "translation"),
+        channel(0, 99, "translation"),
     ]);
     build.push("animations", json!({ "name": "walk", "channels": channels, "samplers": samplers }));
     build.push(
@@ -171,8 +175,8 @@ fn channels_of_every_kind() {
     assert_eq!((turn.property, turn.interpolation), (Property::Rotation, Interpolation::Step));
     assert_eq!(turn.values, [Vec4::W, Vec4::Y]);
     assert_eq!((grow.interpolation, grow.values.len()), (Interpolation::Cubic, 6));
-    assert_eq!(odd.len(), 5, "{odd:?}");
-    for part in ["do not increase", "disagree in number", "\"weights\"", "matrix", "sampler 9"] {
+    assert_eq!(odd.len(), 6, "{odd:?}");
+    for part in ["do not increase", "disagree in number", "\"weights\"", "matrix", "sampler 9", "node 99"] {
         assert!(
             odd.iter().any(|o| o.starts_with("animation 0 \"walk\", channel ") && o.contains(part)),
             "{part}"

@@ -163,7 +163,8 @@ fn images_of_one_source_are_fetched_and_decoded_once() {
             loaded_files.set(loaded_files.get() + 1);
             Ok(png_of(1, 1, &[RED]))
         };
-        let Loaded { scene, diagnostics } = from_bytes(Path::new("test.glb"), &build.glb(), &beside).unwrap();
+        let Loaded { scene, diagnostics, .. } =
+            from_bytes(Path::new("test.glb"), &build.glb(), &beside).unwrap();
         assert_eq!((scene.textures.len(), loaded_files.get()), (textures, loads));
         let shown = scene.materials.iter().filter(|m| m.texture.is_some_and(|t| t.texture == 0)).count();
         assert_eq!((scene.materials.len(), shown), (COUNT, COUNT * textures));
