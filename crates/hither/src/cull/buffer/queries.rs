@@ -84,7 +84,8 @@ impl FromIterator<Aabb> for Boxes {
     }
 }
 
-/// A rectangle of the screen at a depth, in pixels of the image; it may reach beyond it.
+/// A rectangle of the screen at a depth, in pixels of the image; it may reach beyond it. It stands for an object that is
+/// seen in it now, and that may move where objects may.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScreenRect {
     /// Left border.
@@ -95,7 +96,8 @@ pub struct ScreenRect {
     pub right: f64,
     /// Bottom border.
     pub bottom: f64,
-    /// The nearest it comes: [`Projection`] says how depth is counted.
+    /// The nearest it comes: [`Projection`] says how depth is counted. 0 is infinitely far in a perspective view, as a sky
+    /// is, and outside of an orthographic one.
     pub depth: f32,
 }
 
@@ -323,12 +325,54 @@ impl Frame {
     pub(super) fn ask_sphere(&self, bands: &[&Band], center: DVec3, radius: f64) -> Verdict {
         let ball = Ball { center, radius: radius.abs() + self.options.objects_move * 2.0 };
         match ball.on_screen(&self.view, self.margin()) {
-            Ok(rect) => self.ask_rect(bands, &rect),
+            Ok(rect) => self.judge_rect(bands, &rect),
             Err(verdict) => verdict,
         }
     }
 
     pub(super) fn ask_rect(&self, bands: &[&Band], rect: &ScreenRect) -> Verdict {
+        match self.widened_rect(rect) {
+            Some(rect) => self.judge_rect(bands, &rect),
+            None => Verdict::Visible,
+        }
+    }
+
+    /// The rectangle of an object that has moved as far as objects may, about all places where it can then be seen; `None`
+    /// where it may come to the near plane.
+    ///
+    /// A point at (x, z) that moves by (a, b), m or less, comes to (x + a)/(z + b) in the image, (a − b·x/z)/(z + b) away:
+    /// no more than m·√(1 + (x/z)²)/(z − m). `pixels_a_metre` holds the root for all x/z within the image; from beyond it,
+    /// a rectangle reaches the border, where the answer is visible anyway.
+    fn widened_rect(&self, rect: &ScreenRect) -> Option<ScreenRect> {
+        // As boxes are: twice, for what hides it may have moved, too.
+        let moves = self.options.objects_move * self.view.stretch() * 2.0;
+        if moves == 0.0 || rect.depth.is_nan() {
+            return Some(*rect);
+        }
+        let (nearest, depth) = match self.view.projection {
+            Projection::Perspective { near, .. } => {
+                let nearest = near / f64::from(rect.depth).max(0.0) * (1.0 - 1e-9) - moves;
+                if nearest.is_nan() || nearest <= near {
+                    return None;
+                }
+                (nearest, (near / nearest) as f32)
+            }
+            Projection::Orthographic { near, far, .. } => {
+                (1.0, (f64::from(rect.depth) + moves / (far - near)) as f32)
+            }
+        };
+        let by = moves * self.pixels_a_metre / nearest * (1.0 + 1e-9);
+        let ScreenRect { left, top, right, bottom, .. } = *rect;
+        Some(ScreenRect {
+            left: left - by,
+            top: top - by,
+            right: right + by,
+            bottom: bottom + by,
+            depth: depth.next_up(),
+        })
+    }
+
+    fn judge_rect(&self, bands: &[&Band], rect: &ScreenRect) -> Verdict {
         let ScreenRect { left, top, right, bottom, depth } = *rect;
         let (width, height) = (f64::from(self.view.width), f64::from(self.view.height));
         if !(left <= right && top <= bottom) || depth.is_nan() {
@@ -338,7 +382,7 @@ impl Frame {
         if margin.is_some() && !(left > 0.0 && top > 0.0 && right < width && bottom < height) {
             return Verdict::Visible;
         }
-        let beyond = f64::from(depth) <= -margin.map_or(0.0, |margin| margin.depth);
+        let beyond = is_beyond(&self.view, depth, margin.map_or(0.0, |margin| margin.depth));
         if right < 0.0 || bottom < 0.0 || left > width || top > height || beyond {
             return Verdict::Outside;
         }
@@ -354,6 +398,15 @@ impl Frame {
 
     pub(super) fn ask_mesh(&self, bands: &[&Band], mesh: &Occludee, world_from_object: &DAffine3) -> Verdict {
         mesh.judge(world_from_object, |boxes, verdicts| self.ask(bands, boxes, verdicts))
+    }
+}
+
+/// Whether a view sees nothing at this depth or beyond, where its far plane may come farther by as much as `margin`.
+/// Without a far plane, it sees what is infinitely far away.
+pub(super) fn is_beyond(view: &View, depth: f32, margin: f64) -> bool {
+    match view.projection {
+        Projection::Perspective { .. } => depth < 0.0,
+        Projection::Orthographic { .. } => f64::from(depth) <= -margin,
     }
 }
 

@@ -1,5 +1,6 @@
 //! The other meaning of hidden: as a GPU that draws at this resolution would see it.
 
+use super::queries::is_beyond;
 use super::{Ball, Boxes, CannotMerge, Occludee, Occluder, PlacedMesh, ScreenRect, Verdict};
 use crate::conventions::{SurfaceId, View, ViewError};
 use crate::geometry::Aabb;
@@ -204,7 +205,7 @@ impl SampledBuffer {
             right: end(right, self.view.width),
             bottom: end(bottom, self.view.height),
         };
-        if rect.left >= rect.right || rect.top >= rect.bottom || depth <= 0.0 {
+        if rect.left >= rect.right || rect.top >= rect.bottom || is_beyond(&self.view, depth, 0.0) {
             return Verdict::Outside;
         }
         let hidden = dispatch!(self.level, simd => hides(simd, bands, rect, depth));

@@ -226,8 +226,8 @@ impl Culler {
         Culler::default()
     }
 
-    /// Makes the meshes of `index` ready to hide. [`Culler::cull`] does so by itself when it meets an index for
-    /// the first time. Cost: n log n in stored triangles.
+    /// Makes the meshes of `index` ready to hide. [`Culler::cull`] does so by itself when it meets another
+    /// index than the last time, and forgets that one: keep a culler for each index. Cost: n log n in stored triangles.
     pub fn prepare(&mut self, index: &SceneIndex) {
         if self.serial != Some(index.serial) {
             let scene = index.scene();
