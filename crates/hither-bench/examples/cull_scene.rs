@@ -2,16 +2,18 @@
 //!
 //! ```sh
 //! cargo run --release -p hither-bench --example cull_scene -- FILE|world:SPEC WIDTH HEIGHT [sampled] [coherence] [coarse=N]
-//!     [occluder=PX] [piece=PX] [face=PX] [pays=FACES] [frames=N] [samples=N] [camera=NAME]
+//!     [occluder=PX] [piece=PX] [face=PX] [pays=FACES] [frames=N] [samples=N] [exact] [camera=NAME]
 //! ```
 //!
 //! The second line's are the thresholds of [`CullOptions`], how many frames are timed, samples a pixel each way (4; 0
-//! for none), and the only camera.
+//! for none), whether to compare with exact visibility, too, and the only camera.
 //!
-//! *Seen* are the instances that are nearest at a pixel's centre, and at one of 4×4 samples a pixel.
+//! *Seen* are the instances that are nearest at a pixel's centre, and at one of 4×4 samples a pixel; exactly those of
+//! which `hidden_line` finds a visible face or line (it takes all surfaces for double-sided).
 
 use hither::conventions::View;
 use hither::cull::{CullOptions, Culler, Meaning};
+use hither::hidden_line::{Drawing, FaceColor, LineOptions, Preparation, PrepareOptions};
 use hither::{IndexOptions, RenderOptions, SceneIndex, render};
 use std::collections::HashSet;
 use std::error::Error;
@@ -26,28 +28,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         None => hither_io::read(std::path::Path::new(name))?.scene,
     };
     let size = (number(1, 1920), number(2, 1080));
-    let sampled = arguments.iter().any(|a| a == "sampled");
-    let meaning = if sampled { Meaning::Sampled } else { Meaning::Continuous };
-    let coherence = arguments.iter().any(|a| a == "coherence");
-    let coarse = arguments.iter().find_map(|a| a.strip_prefix("coarse=")).map_or(Ok(1), str::parse)?;
-    let number_of = |name: &str, or: u32| {
-        let value = arguments.iter().find_map(|a| a.strip_prefix(name)?.strip_prefix('='));
-        value.map_or(Ok(or), str::parse)
-    };
-    let default = CullOptions::default();
-    let options = CullOptions {
-        meaning,
-        coherence,
-        coarseness: coarse,
-        least_occluder_px: number_of("occluder", default.least_occluder_px)?,
-        least_piece_px: number_of("piece", default.least_piece_px)?,
-        least_px_a_face: number_of("face", default.least_px_a_face)?,
-        faces_a_hidden_box: number_of("pays", default.faces_a_hidden_box)?,
-        ..default
-    };
+    let number_of = |name: &str, or: u32| number_of(&arguments, name, or);
+    let options = options(&arguments)?;
+    let sampled = options.meaning == Meaning::Sampled;
     let (samples, frames) = (number_of("samples", 4)?, number_of("frames", 30)?);
     let only = arguments.iter().find_map(|a| a.strip_prefix("camera="));
     let index = SceneIndex::build(scene, &IndexOptions::default());
+    let exactly = arguments.iter().any(|a| a == "exact");
+    let preparation = exactly.then(|| Preparation::new(index.scene(), &PrepareOptions::default()));
     let mut culler = Culler::new();
     culler.prepare(&index);
     println!(
@@ -84,7 +72,51 @@ fn main() -> Result<(), Box<dyn Error>> {
             truth.difference(&visible).count(),
             found.counters
         );
+        if let Some(preparation) = &preparation {
+            compare_exactly(preparation, &view, &visible)?;
+        }
     }
+    Ok(())
+}
+
+fn number_of(arguments: &[String], name: &str, or: u32) -> Result<u32, std::num::ParseIntError> {
+    let value = arguments.iter().find_map(|a| a.strip_prefix(name)?.strip_prefix('='));
+    value.map_or(Ok(or), str::parse)
+}
+
+fn options(arguments: &[String]) -> Result<CullOptions, std::num::ParseIntError> {
+    let is_said = |name: &str| arguments.iter().any(|a| a == name);
+    let number_of = |name: &str, or: u32| number_of(arguments, name, or);
+    let default = CullOptions::default();
+    Ok(CullOptions {
+        meaning: if is_said("sampled") { Meaning::Sampled } else { Meaning::Continuous },
+        coherence: is_said("coherence"),
+        coarseness: number_of("coarse", default.coarseness)?,
+        least_occluder_px: number_of("occluder", default.least_occluder_px)?,
+        least_piece_px: number_of("piece", default.least_piece_px)?,
+        least_px_a_face: number_of("face", default.least_px_a_face)?,
+        faces_a_hidden_box: number_of("pays", default.faces_a_hidden_box)?,
+        ..default
+    })
+}
+
+/// Prints what an exact drawing shows, and how much of that was not found.
+fn compare_exactly(
+    preparation: &Preparation,
+    view: &View,
+    found: &HashSet<u32>,
+) -> Result<(), Box<dyn Error>> {
+    let start = Instant::now();
+    let options = LineOptions { faces: Some(FaceColor::White), ..LineOptions::default() };
+    let [faces, all] = shown(&preparation.draw(view, &options)?);
+    println!(
+        "  exactly {} by faces, {} with lines ({:.1} s); missing {} and {}",
+        faces.len(),
+        all.len(),
+        start.elapsed().as_secs_f64(),
+        faces.difference(found).count(),
+        all.difference(found).count()
+    );
     Ok(())
 }
 
@@ -94,4 +126,12 @@ fn seen(index: &SceneIndex, view: &View, side: u32) -> Result<HashSet<u32>, Box<
     let frame = render(index, &fine, &RenderOptions::default())?;
     let pixels = (0..fine.height).flat_map(|y| (0..fine.width).map(move |x| (x, y)));
     Ok(pixels.filter_map(|(x, y)| frame.id(x, y)).map(|id| id.instance).collect())
+}
+
+/// Instances with a visible face, and with a visible face or line.
+fn shown(drawing: &Drawing) -> [HashSet<u32>; 2] {
+    let faces: HashSet<u32> = drawing.faces.iter().map(|face| face.part).collect();
+    let lines = drawing.strokes.iter().filter(|stroke| stroke.covers == 0).map(|stroke| stroke.part);
+    let all = faces.iter().copied().chain(lines).collect();
+    [faces, all]
 }

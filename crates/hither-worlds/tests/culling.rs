@@ -4,17 +4,15 @@
 
 mod common;
 
-use common::{assert_every_world_is_in, views_of_cameras};
-use glam::DVec3;
-use hither::conventions::{Projection, View};
+use common::{assert_every_world_is_in, seen, views};
 use hither::cull::{
     Ball, Boxes, CullOptions, Culler, Meaning, Occludee, Occluder, OcclusionBuffer, OcclusionOptions,
     PlacedMesh, Verdict,
 };
 use hither::geometry::Aabb;
 use hither::reference::trouble::Random;
-use hither::scene::{Instance, Scene};
-use hither::{IndexOptions, RenderOptions, SceneIndex, render};
+use hither::scene::Instance;
+use hither::{IndexOptions, SceneIndex};
 use std::collections::HashSet;
 
 /// Every world, small.
@@ -35,38 +33,6 @@ const SPECS: &[&str] = &[
 #[test]
 fn every_world_is_looked_at() {
     assert_every_world_is_in(SPECS);
-}
-
-/// The views of all cameras, and two from random points near instances.
-fn views(scene: &Scene, random: &mut Random) -> Vec<View> {
-    let size = |random: &mut Random| (80 + random.below(120), 60 + random.below(90));
-    let mut views = views_of_cameras(scene, || size(random));
-    let instances = scene.instances();
-    for orthographic in [false, true] {
-        let place = |random: &mut Random| {
-            let instance = &instances[random.below(instances.len() as u32) as usize];
-            let mesh = &scene.meshes[instance.mesh as usize];
-            let vertex = mesh.positions[random.below(mesh.positions.len() as u32) as usize];
-            instance.world_from_mesh.transform_point3(vertex.as_dvec3())
-        };
-        let (eye, target) = (place(random) + random.point(0.3), place(random));
-        let projection = match orthographic {
-            true => {
-                Projection::Orthographic { half_height: random.between(0.5, 20.0), near: -1.0, far: 200.0 }
-            }
-            false => Projection::Perspective { fov_y: random.between(0.5, 2.0), near: 0.05 },
-        };
-        views.push(View::look_at(eye, target + DVec3::Z * 1e-3, DVec3::Y, projection, size(random)));
-    }
-    views
-}
-
-/// The instances nearest at the samples of a picture `times` as fine each way.
-fn seen(index: &SceneIndex, view: &View, times: u32) -> HashSet<u32> {
-    let fine = View { width: view.width * times, height: view.height * times, ..*view };
-    let frame = render(index, &fine, &RenderOptions::default()).unwrap();
-    let pixels = (0..fine.height).flat_map(|y| (0..fine.width).map(move |x| (x, y)));
-    pixels.filter_map(|(x, y)| frame.id(x, y)).map(|id| id.instance).collect()
 }
 
 #[test]
