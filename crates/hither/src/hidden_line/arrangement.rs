@@ -2,16 +2,22 @@
 //!
 //! The cutting itself is `i_overlay`'s: coordinates go to a grid of 62-bit integers, crossings are snapped to
 //! it, and every predicate is exact. What is done here: lines that end *on* another line, computed in
-//! floating point, are made a little longer, so that they do cross it; what then sticks out cuts nothing.
+//! floating point, are made a little longer, so that they do cross it; what then sticks out cuts nothing. Ends that
+//! rounding has put apart become one, and an end that is alone is given a hook, which meets also a line that runs beside
+//! its own: between two that do not meet, what is on one side would leak to the other.
 
 use glam::DVec2;
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::float::simplify::SimplifyShape;
 use i_overlay::float::slice::FloatSlice;
 use i_triangle::float::triangulatable::Triangulatable;
+use std::collections::HashMap;
 
 /// By how much lines are longer at both ends. More than rounding, less than anything that is drawn.
 const LONGER: f64 = 1e-6;
+
+/// The side of the cells, pixels, in which all ends become one. More than rounding, less than [`LONGER`].
+const SAME: f64 = 1e-7;
 
 /// A polygon: its outline, then its holes. Closed, without repeating the first point.
 pub(super) type Polygon = Vec<Vec<DVec2>>;
@@ -19,17 +25,63 @@ pub(super) type Polygon = Vec<Vec<DVec2>>;
 /// Cuts the rectangle from `min` to `max` along the lines.
 pub(super) fn cut(min: DVec2, max: DVec2, lines: impl Iterator<Item = [DVec2; 2]>) -> Vec<Polygon> {
     let outline = vec![[min.x, min.y], [max.x, min.y], [max.x, max.y], [min.x, max.y]];
+    let mut ends = Ends::default();
+    let lines: Vec<[u32; 2]> = lines.map(|line| line.map(|end| ends.name(end))).collect();
+    let mut lines_at = vec![0u32; ends.points.len()];
+    lines.iter().filter(|[a, b]| a != b).flatten().for_each(|&end| lines_at[end as usize] += 1);
+    let is_alone = |end: u32| lines_at[end as usize] == 1;
     let paths: Vec<Vec<[f64; 2]>> = lines
+        .into_iter()
         .filter(|[a, b]| a != b)
         .map(|[a, b]| {
-            let more = (b - a).normalize_or_zero() * LONGER;
-            vec![(a - more).to_array(), a.to_array(), b.to_array(), (b + more).to_array()]
+            let [from, to] = [a, b].map(|end| ends.points[end as usize]);
+            let more = (to - from).normalize_or_zero() * LONGER;
+            let mut path = beyond(from, -more, is_alone(a));
+            path.extend([from, to]);
+            path.extend(beyond(to, more, is_alone(b)).into_iter().rev());
+            path.into_iter().map(|p| p.to_array()).collect()
         })
         .collect();
     if paths.is_empty() {
         return vec![vec![outline.into_iter().map(DVec2::from).collect()]];
     }
     polygons(outline.slice_by_as::<i64>(&paths, FillRule::EvenOdd))
+}
+
+/// How a line goes on beyond an end, from the outside in: by `more`, or in a hook that is as wide to either side, so that
+/// it crosses whatever passes nearer than that, in any direction.
+fn beyond(end: DVec2, more: DVec2, hooked: bool) -> Vec<DVec2> {
+    let aside = more.perp();
+    if hooked { vec![end + more - aside, end + more + aside] } else { vec![end + more] }
+}
+
+/// Ends of lines: those in a cell of a grid, and in its neighbours nearer than a cell's side, are one.
+#[derive(Default)]
+struct Ends {
+    points: Vec<DVec2>,
+    cells: HashMap<[i64; 2], u32>,
+}
+
+impl Ends {
+    /// The number of the point that `p` is one with: the first that was met, or itself.
+    fn name(&mut self, p: DVec2) -> u32 {
+        let cell = |p: DVec2| (p / SAME).floor().to_array().map(|c| c as i64);
+        let here = cell(p);
+        if let Some(&known) = self.cells.get(&here) {
+            return known;
+        }
+        let half = DVec2::splat(SAME * 0.5);
+        let ([left, top], [right, bottom]) = (cell(p - half), cell(p + half));
+        let around = [[left, top], [right, top], [left, bottom], [right, bottom]];
+        let near = |&known: &u32| self.points[known as usize].distance(p) <= SAME * 0.5;
+        let known = around.iter().find_map(|at| self.cells.get(at).copied().filter(near));
+        let name = known.unwrap_or(self.points.len() as u32);
+        if known.is_none() {
+            self.points.push(p);
+        }
+        self.cells.insert(here, name);
+        name
+    }
 }
 
 /// The polygons together, without the lines between those that share an edge.
@@ -126,6 +178,25 @@ mod tests {
         assert!((areas.iter().sum::<f64>() - 100.0).abs() < 1e-9);
         assert!((areas[0] - 4.0).abs() < 1e-9 && (areas[1] - 21.0).abs() < 1e-9, "{areas:?}");
         assert_eq!(regions.iter().filter(|r| r.len() == 2).count(), 1);
+    }
+
+    #[test]
+    fn lines_that_rounding_put_apart_let_nothing_through() {
+        let v = DVec2::new;
+        let (min, max) = (v(0., 0.), v(10., 10.));
+        for slope in [0.0, 0.3, -1.1] {
+            let at = |x: f64, off: f64| v(x, 5.0 + slope * (x - 5.0) + off);
+            for off in [1e-13, -1e-13, 3e-10, -3e-10] {
+                // One goes on where the other ends; and each a way beside the other.
+                for [left, right] in [[4.0, 4.0], [4.0 + 1e-12, 4.0], [4.5, 3.5]] {
+                    let lines = [[at(-1.0, 0.0), at(left, 0.0)], [at(right, off), at(11.0, off)]];
+                    let regions = cut(min, max, lines.into_iter());
+                    let mut areas: Vec<f64> = regions.iter().map(area).filter(|a| *a > 1e-6).collect();
+                    areas.sort_by(f64::total_cmp);
+                    assert!(areas.len() == 2 && areas[0] > 40.0, "{slope} {off} {left} {right}: {areas:?}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -61,7 +61,7 @@ impl Preparation {
     fn drawing(&self, view: &View, options: &LineOptions, crew: Crew) -> Drawing {
         let lens = Lens::new(view, self.tolerance);
         let picture = DVec2::new(f64::from(view.width), f64::from(view.height));
-        let planes = planes(view, options);
+        let planes = planes(view, &lens, options);
         let placed = self.place(view, &lens, &planes, picture);
         let mut counters = Counters {
             instances_culled: (self.instances.len() - placed.len()) as u64,
@@ -168,12 +168,12 @@ fn see_through<'a>(shown: &'a Shown, options: &LineOptions) -> impl Fn(u32) -> b
     move |t: u32| asked && shown.blends(t)
 }
 
-fn planes(view: &View, options: &LineOptions) -> Vec<HalfSpace> {
+fn planes(view: &View, lens: &Lens, options: &LineOptions) -> Vec<HalfSpace> {
     let mut planes = Lens::range(&view.projection);
     for section in &options.sections {
         let normal = -(view.view_from_world.matrix3 * section.normal.normalize_or_zero());
         let point = view.view_from_world.transform_point3(section.point);
-        planes.push(HalfSpace { normal, offset: -normal.dot(point), section: true });
+        planes.push(HalfSpace { normal, offset: -normal.dot(point), section: true, lens: Some(*lens) });
     }
     planes
 }

@@ -15,12 +15,19 @@ pub(super) struct HalfSpace {
     pub offset: f64,
     /// A section plane of the user's: where it cuts, lines and caps are drawn.
     pub section: bool,
+    /// How far from a section plane a point in view space still lies in it.
+    pub lens: Option<Lens>,
 }
 
 impl HalfSpace {
-    /// Signed distance times the normal's length.
+    /// Signed distance times the normal's length. Of a section plane, whose normal is a unit vector, 0 where rounding
+    /// may have put the point: however the view is turned, the same points lie in the plane.
     pub fn side(&self, p: DVec3) -> f64 {
-        self.normal.dot(p) + self.offset
+        let side = self.normal.dot(p) + self.offset;
+        match &self.lens {
+            Some(lens) if side.abs() <= lens.tolerance && side.abs() <= lens.rounding_of_point(p) => 0.0,
+            _ => side,
+        }
     }
 }
 
@@ -34,6 +41,9 @@ pub(super) struct Lens {
     /// What differs by more than this, metres, is nowhere at the same place.
     pub tolerance: f64,
 }
+
+/// The part of a coordinate in view space that is rounding of the arithmetic in `f64`, several operations of it.
+const ARITHMETIC: f64 = 1e-14;
 
 /// Surfaces at a flatter angle to the line of sight than this (its sine) are judged as if at this angle.
 const FLATTEST: f64 = 1e-3;
@@ -81,8 +91,12 @@ impl Lens {
 
     /// The same of a point in view space, in any direction; never more than [`Lens::tolerance`].
     pub fn rounding_of_point(&self, p: DVec3) -> f64 {
+        let stored = ROUNDING * self.world_from_view.transform_point3(p).abs().max_element();
+        // Of that little is left near the origin of the world, where the view's own arithmetic rounds as elsewhere.
+        let eye = self.world_from_view.translation;
+        let computed = ARITHMETIC * (p.abs().max_element() + eye.abs().max_element());
         // Of NaN, what is no NaN.
-        (ROUNDING * self.world_from_view.transform_point3(p).abs().max_element()).min(self.tolerance)
+        (stored + computed).min(self.tolerance)
     }
 
     /// The largest difference of w, near depth `w`, that any surface calls the same place.
@@ -109,11 +123,11 @@ impl Lens {
 
     /// Half-spaces that a view shows: beyond the near plane and before the far one.
     pub fn range(projection: &Projection) -> Vec<HalfSpace> {
-        let near = HalfSpace { normal: DVec3::NEG_Z, offset: -projection.near(), section: false };
+        let near = HalfSpace { normal: DVec3::NEG_Z, offset: -projection.near(), section: false, lens: None };
         match *projection {
             Projection::Perspective { .. } => vec![near],
             Projection::Orthographic { far, .. } => {
-                vec![near, HalfSpace { normal: DVec3::Z, offset: far, section: false }]
+                vec![near, HalfSpace { normal: DVec3::Z, offset: far, section: false, lens: None }]
             }
         }
     }

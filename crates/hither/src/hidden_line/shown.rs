@@ -8,7 +8,7 @@ use super::bodies::{Body, Paper};
 use super::crew::Crew;
 use super::lens::{HalfSpace, Lens};
 use super::predicates::orientation;
-use super::topology::{Mix, NONE, Topology, trait_of};
+use super::topology::{Edge, Mix, NONE, Topology, trait_of};
 use glam::{DAffine3, DVec3, Vec3};
 use std::collections::HashMap;
 
@@ -189,16 +189,19 @@ impl<'p> Shown<'p> {
         let planes = std::mem::take(&mut self.planes);
         let inside = |p: &DVec3| planes.iter().all(|plane| plane.side(*p) >= 0.0);
         let kept: Vec<bool> = self.in_view[first_vertex as usize..].iter().map(inside).collect();
-        if kept.iter().all(|&k| k) {
+        let in_section = in_section(topology, &planes, &self.in_view[first_vertex as usize..]);
+        if kept.iter().all(|&k| k) && in_section.is_empty() {
             self.planes = planes;
             return None;
         }
+        let first_triangle = self.triangles.len();
         let mut cut = Cut { kept, ..Cut::default() };
         for (i, t) in topology.triangles.iter().enumerate() {
-            let whole = t[0] != NONE && t.iter().all(|&v| cut.kept[v as usize]);
+            let there = t[0] != NONE && !in_section.get(i).is_some_and(|&lies| lies);
+            let whole = there && t.iter().all(|&v| cut.kept[v as usize]);
             cut.whole.push(whole);
             cut.place.push(NONE);
-            if t[0] == NONE {
+            if !there {
                 continue;
             }
             let mut polygon: Vec<u32> = t.to_vec();
@@ -220,6 +223,9 @@ impl<'p> Shown<'p> {
         for edge in topology.edges.iter().filter(|e| e.traits & trait_of::LOOSE != 0) {
             self.clip_loose(&mut cut, first_vertex, edge.vertices, &planes);
         }
+        if !in_section.is_empty() {
+            self.drop_unused(topology, &mut cut, first_triangle, first_vertex);
+        }
         // Vertices that are cut away stay in the list, unused; project() must not see them behind the eye.
         for (v, &kept) in cut.kept.iter().enumerate() {
             if !kept && v < topology.positions.len() {
@@ -228,6 +234,16 @@ impl<'p> Shown<'p> {
         }
         self.planes = planes;
         Some(cut)
+    }
+
+    /// Vertices of which no triangle and no loose edge is left are not kept.
+    fn drop_unused(&self, topology: &Topology, cut: &mut Cut, first_triangle: usize, first_vertex: u32) {
+        let mut used = vec![false; cut.kept.len()];
+        let corners = self.triangles[first_triangle..].iter().flatten().map(|v| v - first_vertex);
+        let loose =
+            topology.edges.iter().filter(|e| e.traits & trait_of::LOOSE != 0).flat_map(|e| e.vertices);
+        corners.chain(loose).for_each(|v| used[v as usize] = true);
+        cut.kept.iter_mut().zip(used).for_each(|(kept, used)| *kept &= used);
     }
 
     /// What is left of a polygon on the kept side of a plane; on the way, the outline of the cut.
@@ -439,6 +455,24 @@ impl<'p> Shown<'p> {
         let [a, b, c] = self.triangles[triangle as usize];
         [self.in_view[a as usize], self.in_view[b as usize], self.in_view[c as usize]]
     }
+}
+
+/// For each triangle of a closed mesh whether it lies in a section plane. A body that ends there is closed by its cap
+/// instead, and of one that begins there nothing stays. Empty if there is none.
+fn in_section(topology: &Topology, planes: &[HalfSpace], in_view: &[DVec3]) -> Vec<bool> {
+    let mut all = Vec::new();
+    for plane in planes.iter().filter(|plane| plane.section) {
+        let in_plane: Vec<bool> = in_view.iter().map(|&p| plane.side(p) == 0.0).collect();
+        if !in_plane.contains(&true) {
+            continue;
+        }
+        all.resize(topology.triangles.len(), false);
+        for (corners, lies) in topology.triangles.iter().zip(&mut all) {
+            *lies |= corners[0] != NONE && corners.iter().all(|&v| in_plane[v as usize]);
+        }
+    }
+    let ends = |e: &Edge| e.triangles.contains(&NONE) && e.traits & trait_of::LOOSE == 0;
+    if all.contains(&true) && !topology.edges.iter().any(ends) { all } else { Vec::new() }
 }
 
 /// Whether a map is a rotation, a reflection and one scale.

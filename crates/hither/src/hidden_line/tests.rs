@@ -6,11 +6,11 @@ mod junctions;
 mod scenes;
 
 use super::{Drawing, Kinds, LineOptions, Preparation, PrepareOptions};
-use crate::conventions::View;
+use crate::conventions::{Projection, View};
 use crate::reference::lines::{Line, LineOracle, Verdict};
 use crate::reference::trouble;
 use crate::scene::Scene;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 /// A sample is drawn if a stroke passes this near, pixels.
 const NEAR_PX: f64 = 2e-3;
@@ -164,6 +164,19 @@ fn judge(scene: &Scene, view: &View) -> Score {
 fn drawings_agree_with_dense_sampling_on_troublesome_scenes() {
     let (mut right, mut unsure) = (0, 0);
     let mut wrong = Vec::new();
+    let scenes = scenes::bodies();
+    let crossing = |name: &str| ["crossing", "corner"].contains(&name);
+    let random = &mut trouble::Random::new(3);
+    for (name, scene) in scenes.iter().filter(|s| crossing(s.0)) {
+        for _ in 0..30 {
+            let eye = random.point(4.0);
+            let projection = Projection::Orthographic { half_height: 4.0, near: -20.0, far: 20.0 };
+            let view = View::look_at(eye, DVec3::ZERO, DVec3::Y, projection, (61, 53));
+            let (r, u) = judge_faces(name, scene, &view);
+            right += r;
+            unsure += u;
+        }
+    }
     for seed in 0..60 {
         let scene = trouble::scene(seed);
         if scene.bounds().is_none_or(|b| b.size().max_element() > 200.0)
@@ -501,5 +514,36 @@ fn rigid_motion_of_scene_and_eye_does_not_change_the_drawing() {
             let (a, b) = (length(&scene, &view), length(&moved, &from_there));
             assert!((a - b).abs() < 1e-4 * a, "{name}: {a} and {b}");
         }
+    }
+}
+
+#[test]
+fn edges_that_touch_at_the_origin_are_seen() {
+    let bodies = scenes::bodies();
+    let scene = &bodies.iter().find(|s| s.0 == "corner").unwrap().1;
+    let preparation = Preparation::new(scene, &PrepareOptions::default());
+    let random = &mut trouble::Random::new(3);
+    // The edges of the three sides of the cube that are towards the eye.
+    let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2 & 1));
+    let edges: Vec<[DVec3; 2]> = (0..8u32)
+        .flat_map(|k| [1, 2, 4].map(|bit| [k, k | bit]))
+        .filter(|[a, b]| a != b && !(a | 2 == 7 && b | 2 == 7) && ![[1, 5], [4, 5]].contains(&[*a, *b]))
+        .map(|[a, b]| [corner(a), corner(b)])
+        .collect();
+    assert_eq!(edges.len(), 9);
+    for round in 0..100 {
+        let eye = DVec3::new(-random.between(1., 6.), random.between(1.1, 5.), -random.between(1., 6.));
+        let projection = Projection::Perspective { fov_y: 1.0, near: 0.1 };
+        let view = View::look_at(eye, DVec3::splat(0.5), DVec3::Y, projection, (1280, 720));
+        let on_paper = |p: DVec3| {
+            let p = view.view_from_world.transform_point3(p);
+            p.truncate() / -p.z * view.pixels_per_unit()
+        };
+        let expected: f64 = edges.iter().map(|[a, b]| on_paper(*a).distance(on_paper(*b))).sum();
+        let drawing = preparation.draw(&view, &all_lines()).unwrap();
+        let of_cube = drawing.strokes.iter().filter(|s| s.part == 0 && s.covers == 0);
+        let length: f64 =
+            of_cube.flat_map(|s| drawing.points_of(s).windows(2)).map(|w| w[0].distance(w[1])).sum();
+        assert!((length - expected).abs() < 1e-6 * expected, "round {round}: {eye} {length} {expected}");
     }
 }

@@ -20,31 +20,32 @@ pub(super) struct Outline {
 }
 
 impl Outline {
-    /// Cuts a mesh. Ends that no other segment continues are joined to others that rounding may put apart.
+    /// Cuts a mesh, just beside the plane on its kept side: a body that ends in the plane is cut there, one that is
+    /// taken away and begins in it is not. Ends that no other segment continues are joined to others that rounding may put apart.
     pub fn of(topology: &Topology, view_from_mesh: &DAffine3, plane: &HalfSpace, lens: &Lens) -> Outline {
         let place = |v: u32| view_from_mesh.transform_point3(topology.positions[v as usize].as_dvec3());
         let sides: Vec<f64> = (0..topology.positions.len() as u32).map(|v| plane.side(place(v))).collect();
         let mut outline = Outline::default();
-        if sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s < 0.0) {
+        if sides.iter().all(|&s| s > 0.0) || sides.iter().all(|&s| s <= 0.0) {
             return outline;
         }
         let mut known: HashMap<[u32; 2], u32, Mix> = HashMap::default();
         for (number, t) in topology.triangles.iter().enumerate().filter(|(_, t)| t[0] != NONE) {
             let of = t.map(|v| sides[v as usize]);
-            if of.iter().all(|&s| s >= 0.0) || of.iter().all(|&s| s < 0.0) {
+            if of.iter().all(|&s| s > 0.0) || of.iter().all(|&s| s <= 0.0) {
                 continue;
             }
             let mut ends = [NONE; 2];
             for k in 0..3 {
                 let (a, b) = (t[k], t[(k + 1) % 3]);
                 let (sa, sb) = (of[k], of[(k + 1) % 3]);
-                if (sa < 0.0) == (sb < 0.0) {
+                if (sa <= 0.0) == (sb <= 0.0) {
                     continue;
                 }
                 // The point on the plane: a corner in it, or a crossing, the same from both triangles.
-                let (kept, lost) = if sb < 0.0 { (a, b) } else { (b, a) };
-                let whole = sides[kept as usize] == 0.0;
-                let name = if whole { [kept, kept] } else { ordered(kept, lost) };
+                let (kept, lost) = if sb <= 0.0 { (a, b) } else { (b, a) };
+                let whole = sides[lost as usize] == 0.0;
+                let name = if whole { [lost, lost] } else { ordered(kept, lost) };
                 let point = *known.entry(name).or_insert_with(|| {
                     let [low, high] = name;
                     let (sl, sh) = (sides[low as usize], sides[high as usize]);
@@ -52,7 +53,7 @@ impl Outline {
                     outline.points.push(if whole { p } else { p + (q - p) * (sl / (sl - sh)) });
                     outline.points.len() as u32 - 1
                 });
-                ends[usize::from(sb >= 0.0)] = point;
+                ends[usize::from(sb > 0.0)] = point;
             }
             if ends[0] != ends[1] && !ends.contains(&NONE) {
                 outline.segments.push(ends);

@@ -3,6 +3,7 @@
 use super::super::{Drawing, Face, FaceColor, Kind, LineOptions, Preparation, PrepareOptions, SectionPlane};
 use super::{all_lines, scenes};
 use crate::conventions::{Projection, View};
+use crate::reference::trouble::Random;
 use crate::scene::{AlphaMode, Material, Scene, Transform};
 use glam::{DVec3, Vec3, Vec4};
 
@@ -96,6 +97,59 @@ fn two_planes_cut_each_others_caps() {
         let drawing = draw(&scene, &planes);
         assert!((cut_area(&drawing) - 16.0).abs() < 1e-9, "{}", cut_area(&drawing));
         assert!((length(&drawing, Kind::Section) - 20.0).abs() < 1e-9, "{}", length(&drawing, Kind::Section));
+    }
+}
+
+#[test]
+fn planes_along_faces_cut_the_same_from_everywhere() {
+    let mut scene = Scene::new("storeys");
+    for (name, min, max) in [
+        ("low", [0.3, 0.0, 0.2], [1.3, 1.0, 1.2]),
+        ("up", [0.5, 1.0, 0.4], [0.9, 2.0, 0.7]),
+        ("beside", [2.0, 1.0, 0.2], [3.0, 2.0, 1.2]),
+    ] {
+        scenes::add_box(&mut scene, name, min, max);
+    }
+    let preparation = Preparation::new(&scene, &PrepareOptions::default());
+    let random = &mut Random::new(5);
+    let level = |up: f64| plane(DVec3::Y, DVec3::Y * up);
+    for round in 0..120 {
+        // From above, where the upper half is taken away, or from below.
+        let up = if round % 2 == 0 { 1.0 } else { -1.0 };
+        let eye =
+            DVec3::new(random.between(-4., 4.), 1.0 + up * random.between(1., 5.), random.between(-4., 4.));
+        let projection = match round % 3 {
+            0 => Projection::Orthographic { half_height: 3.0, near: 0.0, far: 100.0 },
+            _ => Projection::Perspective { fov_y: 1.5, near: 0.01 },
+        };
+        let view = View::look_at(eye, DVec3::new(1.3, 1.0, 0.7), DVec3::Z, projection, (500, 500));
+        let draw = |sections: Vec<SectionPlane>| {
+            let options = LineOptions { sections, faces: Some(FaceColor::White), ..all_lines() };
+            preparation.draw(&view, &options).unwrap()
+        };
+        let drawing = draw(vec![level(up)]);
+        let cut: &[u32] = if up > 0.0 { &[0] } else { &[1, 2] };
+        let caps: Vec<u32> = drawing.faces.iter().filter(|f| f.cut).map(|f| f.part).collect();
+        assert_eq!(caps, cut, "{view:?}");
+        assert!(drawing.faces.iter().all(|f| cut.contains(&f.part)), "{view:?}");
+        assert!(drawing.strokes.iter().all(|s| cut.contains(&s.part)), "{view:?}");
+        let twice = draw(vec![level(up), level(up)]);
+        let area = |d: &Drawing| d.faces.iter().map(Face::area).sum::<f64>();
+        assert!((area(&drawing) - area(&twice)).abs() < 1e-6 * area(&drawing), "{view:?}");
+        let lengths = [length(&drawing, Kind::Section), length(&twice, Kind::Section)];
+        assert!((lengths[0] - lengths[1]).abs() < 1e-9 && lengths[0] > 0.1, "{view:?}: {lengths:?}");
+    }
+}
+
+#[test]
+fn a_sheet_in_a_cutting_plane_stays() {
+    let mut scene = Scene::new("sheet");
+    let corners = [[-1., -1., 0.], [1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]].map(Vec3::from).to_vec();
+    scenes::add(&mut scene, "sheet", corners, vec![[0, 1, 2], [0, 2, 3]], Transform::default());
+    for normal in [DVec3::Z, DVec3::NEG_Z] {
+        let drawing = draw(&scene, &[plane(DVec3::ZERO, normal)]);
+        assert!((drawing.faces.iter().map(Face::area).sum::<f64>() / 1e4 - 4.0).abs() < 1e-9);
+        assert_eq!(cut_area(&drawing), 0.0);
     }
 }
 

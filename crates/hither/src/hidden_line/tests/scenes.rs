@@ -87,6 +87,17 @@ pub fn bodies() -> Vec<(&'static str, Scene)> {
     }
     scenes.push(("building", scene));
 
+    let mut scene = Scene::new("crossing");
+    add_box(&mut scene, "lying", [1.0, -2.0, -1.0], [3.0, 0.0, 1.0]);
+    add_box(&mut scene, "standing", [1.0, -1.0, -1.0], [3.0, 1.0, 0.0]);
+    scenes.push(("crossing", scene));
+
+    // Where a coordinate is 0, nothing of it is rounded.
+    let mut scene = Scene::new("corner");
+    add_box(&mut scene, "cube", [0.0; 3], [1.0; 3]);
+    add_box(&mut scene, "floor", [-3.0, -0.5, -3.0], [3.0, 0.0, 3.0]);
+    scenes.push(("corner", scene));
+
     let mut scene = Scene::new("balls");
     ball(&mut scene, "one", DVec3::ZERO, 1.0, 6);
     ball(&mut scene, "two", DVec3::new(0.7, 0.3, 0.4), 0.8, 5);
