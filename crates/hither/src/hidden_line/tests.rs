@@ -419,7 +419,7 @@ fn a_cut_body_shows_its_cap_and_its_outline() {
     let mut scene = Scene::new("cut");
     scenes::add_box(&mut scene, "box", [0.0; 3], [2.0; 3]);
     let view = scenes::views(&scene)[2];
-    let section = super::SectionPlane { point: glam::DVec3::Z * 0.5, normal: glam::DVec3::Z };
+    let section = super::SectionPlane { point: DVec3::Z * 0.5, normal: DVec3::Z };
     let preparation = Preparation::new(&scene, &PrepareOptions::default());
     let options = LineOptions {
         sections: vec![section],
@@ -441,7 +441,7 @@ fn a_cut_body_shows_its_cap_and_its_outline() {
 fn the_outline_of_a_cut_is_not_hidden_by_its_own_cap() {
     for (name, scene) in scenes::bodies().into_iter().filter(|(name, _)| *name != "sheets") {
         let at = scene.bounds().unwrap().center() + 0.013;
-        let section = super::SectionPlane { point: at, normal: glam::DVec3::new(0.2, 0.9, 0.3) };
+        let section = super::SectionPlane { point: at, normal: DVec3::new(0.2, 0.9, 0.3) };
         for view in &scenes::views(&scene)[..2] {
             let options = LineOptions { sections: vec![section], hidden: true, ..all_lines() };
             let preparation = Preparation::new(&scene, &PrepareOptions::default());
@@ -456,7 +456,7 @@ fn the_outline_of_a_cut_is_not_hidden_by_its_own_cap() {
 fn nothing_to_see_is_an_empty_drawing() {
     let (_, scene) = scenes::bodies().remove(0);
     let mut view = scenes::views(&scene)[0];
-    view.view_from_world = glam::DAffine3::from_translation(glam::DVec3::X * 100.0);
+    view.view_from_world = glam::DAffine3::from_translation(DVec3::X * 100.0);
     let preparation = Preparation::new(&scene, &PrepareOptions::default());
     let options = LineOptions { faces: Some(super::FaceColor::Flat), hatch: Some(3.0), ..all_lines() };
     let drawing = preparation.draw(&view, &options).unwrap();
@@ -497,8 +497,8 @@ fn a_million_coincident_edges_are_drawn_once() {
 fn rigid_motion_of_scene_and_eye_does_not_change_the_drawing() {
     for (name, scene) in scenes::bodies() {
         let motion = glam::DAffine3::from_rotation_translation(
-            glam::DQuat::from_axis_angle(glam::DVec3::new(0.6, 0.0, 0.8), 1.1),
-            glam::DVec3::new(1.5, -2.0, 0.7),
+            glam::DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.1),
+            DVec3::new(1.5, -2.0, 0.7),
         );
         let mut moved = scene.clone();
         for node in &mut moved.groups[0].nodes {
