@@ -134,7 +134,9 @@ pub enum FaceColor {
     Flat,
 }
 
-/// A plane that cuts the scene: what is on the side of its normal is taken away.
+/// A plane that cuts the scene: what is on the side of its normal is taken away. A closed body that ends in the plane is cut
+/// there, and of one that begins in it and is taken away nothing stays; an open sheet in it does. In the plane is what
+/// rounding may have put there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SectionPlane {
     /// A point of the plane, world space.
