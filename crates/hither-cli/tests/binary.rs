@@ -614,6 +614,12 @@ fn lines_refuses_what_it_cannot_draw() {
     refused(&["lines", WORLD, "-o", &svg, "--views", "side"], 2, &["side", "front"]);
     refused(&["lines", WORLD, "-o", &svg, "--edges", "wires"], 2, &["wires", "silhouette"]);
     refused(&["lines", WORLD, "-o", &svg, "--cut", "0,0,0,1"], 2, &["normal"]);
+    refused(&["lines", WORLD, "-o", &svg, "--cut", "1e-150,0,0,-1e308"], 2, &["--cut", "too large"]);
+    for sheet in [&["--views", "front"][..], &["--parallel"]] {
+        let usual = ["lines", WORLD, "-o", &svg, "--size"];
+        refused(&[&usual[..], &["0x0"], sheet].concat(), 1, &["0x0"]);
+        refused(&[&usual[..], &["20000x0"], sheet].concat(), 1, &["20000x0"]);
+    }
     refused(&["lines", "world:office?n=33", "-o", &svg], 1, &["539,055,000 triangles"]);
     assert!(folder.names().is_empty());
 }

@@ -204,7 +204,11 @@ fn section(text: &str) -> Result<SectionPlane, String> {
             if !length.is_normal() {
                 return Err("the plane has no normal; one of the first three numbers must not be 0".into());
             }
-            Ok(SectionPlane { point: normal * (d / length), normal })
+            let point = normal * (d / length);
+            if !point.is_finite() {
+                return Err("the plane is farther away than numbers go; D is too large for its normal".into());
+            }
+            Ok(SectionPlane { point, normal })
         }
         _ => Err(wrong()),
     }
@@ -222,6 +226,7 @@ mod tests {
         assert_eq!(section("y=1.5"), Ok(SectionPlane { point: DVec3::Y * 1.5, normal: DVec3::Y }));
         assert_eq!(section("-z=2"), Ok(SectionPlane { point: DVec3::Z * 2.0, normal: DVec3::NEG_Z }));
         assert_eq!(section("0,2,0,4").unwrap().point, DVec3::Y * 2.0);
+        assert!(section("1e-150,0,0,-1e100").is_ok() && section("1e-150,0,0,-1e308").is_err());
         assert!(["w=1", "y=", "1,2,3", "0,0,0,1", ""].iter().all(|t| section(t).is_err()));
         assert!(views("front, top").is_ok() && views("front,side").is_err());
         assert!(kinds("crease,silhouette").unwrap().crease && kinds("edges").is_err());

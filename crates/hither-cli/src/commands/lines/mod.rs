@@ -28,9 +28,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut files = Files::of_scene(&arguments.scene);
     files.writes("-o", arguments.output.as_deref(), arguments.view.frames.as_ref())?;
     files.reports(report)?;
-    if arguments.views.is_none() && !arguments.parallel {
-        arguments.view.check_size()?;
-    }
+    check_paper(arguments)?;
     // All that follows is done in this pool. Nothing before needs one, so that this cannot come too late.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.into()).build_global();
 
@@ -87,6 +85,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     json.insert("prepare_ms".into(), report::milliseconds(prepare_time));
     json.insert("frames".into(), frames.into());
     outputs::write_report(arguments.report.json.as_deref(), &json.into())
+}
+
+/// Refuses a drawing of no size. Sheets may be larger than a picture can be.
+fn check_paper(arguments: &Arguments) -> Result<(), Failure> {
+    let (width, height) = arguments.view.size;
+    match arguments.views.is_some() || arguments.parallel {
+        true if width > 0 && height > 0 => Ok(()),
+        true => Err(Failure::work(format!(
+            "a sheet of {width}x{height} pixels has no room; choose a larger --size"
+        ))),
+        false => arguments.view.check_size(),
+    }
 }
 
 /// Triangles in view are held in memory, some 70 bytes each.
