@@ -56,7 +56,7 @@ pub struct Arguments {
     /// Composite with a picture of your own in place of the layer that holds a part
     #[arg(long, value_name = "NAME=FILE")]
     replace: Vec<String>,
-    /// Compare the composite with the picture drawn directly
+    /// Compare the composite with the picture drawn directly, without --split
     #[arg(long)]
     verify: bool,
     /// With --frames: draw a layer anew only where its last picture, warped by an affine map, would be off by more
@@ -106,6 +106,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     // A picture, and what draws and holds one layer.
     arguments.view.check_memory(32)?;
     let mut scene = source::open_surfaces(&arguments.scene, &files, verbosity)?;
+    let mut direct = verify::Direct::of(&scene, arguments.verify && arguments.parts.splits());
     let prepared = arguments.parts.prepare(&mut scene, &arguments.scene)?;
     let timeline = Timeline::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     timeline.pose_scene(&mut scene, timeline.frames.start)?;
@@ -142,8 +143,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             files = write::write(format, output, &taken, (view.width, view.height))?;
         }
         say(verbosity, &taken, output.as_deref(), timeline.numbered);
+        let whole = direct.painter(&timeline, number)?.unwrap_or(&mut painter);
         let check = match arguments.verify {
-            true => Some(verify::verify(&taken, &view, &mut painter, &paint, verbosity)?),
+            true => Some(verify::verify(&taken, &view, whole, &paint, verbosity)?),
             false => None,
         };
         let focus =

@@ -34,7 +34,7 @@ pub struct PartOptions {
     /// `NAME=adaptive:N`, up to N pieces where it is least convex
     #[arg(long, value_name = "NAME|INDEX=HOW", value_parser = pieces)]
     split: Vec<(String, SplitBy)>,
-    /// By how many per cent a piece is larger, so that no gap shows between pieces
+    /// By how many per cent a piece is larger, so that no gap shows between pieces; those of meshes that blend are not
     #[arg(long, value_name = "PERCENT", default_value_t = 20.0, value_parser = overlap, requires = "split")]
     overlap: f64,
 }
@@ -64,10 +64,15 @@ impl Prepared {
 }
 
 impl PartOptions {
+    /// Whether anything is to be split.
+    pub fn splits(&self) -> bool {
+        !self.split.is_empty()
+    }
+
     /// Splits what is to be split. The scene must be as it was opened.
     pub fn prepare(&self, scene: &mut Scene, source: &str) -> Result<Prepared, Failure> {
         let mut prepared = Prepared::of(scene);
-        if !self.split.is_empty() {
+        if self.splits() {
             let split = split_nodes(std::mem::take(scene), &self.split, self.overlap / 100.0);
             let split = split.map_err(|e| Failure::work(format!("{source}: {e}")))?;
             *scene = split.scene;

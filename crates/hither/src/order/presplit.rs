@@ -21,8 +21,9 @@ pub struct PreSplit {
 
 /// Splits the meshes of, and below, the root group's nodes of the given names. Where there is no such node, a number
 /// is that of a part, if every instance is one ([`Granularity::Instances`](super::Granularity::Instances)). `overlap`
-/// is as for [`split`]. Piece k of a node is called by the node's name, or `part` and its number, and k. A mesh that is
-/// one piece stays as it is.
+/// is as for [`split`], and 0 for meshes that blend: where their pieces overlapped, both would tint what is behind.
+/// Piece k of a node is called by the node's name, or `part` and its number, and k. A mesh that is one piece stays
+/// as it is.
 ///
 /// # Errors
 /// A name that no node with a mesh of or below it has, and that is no such number.
@@ -44,6 +45,7 @@ pub fn split_nodes(mut scene: Scene, by: &[(String, SplitBy)], overlap: f64) -> 
         }
         for (node, mesh) in nodes {
             let (first_mesh, split) = known.entry((mesh, rule)).or_insert_with(|| {
+                let overlap = if blends(&scene, mesh) { 0.0 } else { overlap };
                 let split = split(&scene.meshes[mesh as usize], by, overlap);
                 let first = scene.meshes.len() as u32;
                 if split.pieces.len() > 1 {
@@ -74,6 +76,11 @@ pub fn split_nodes(mut scene: Scene, by: &[(String, SplitBy)], overlap: f64) -> 
         }
     }
     Ok(PreSplit { scene, pieces, seams })
+}
+
+/// Whether any of a mesh is blended.
+fn blends(scene: &Scene, mesh: u32) -> bool {
+    scene.meshes[mesh as usize].primitives.iter().any(|p| scene.is_blended(p.material))
 }
 
 /// The nodes with a mesh among those of a name and what is below them, with their meshes.
@@ -113,7 +120,7 @@ impl Seam {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Mesh, Primitive};
+    use crate::scene::{AlphaMode, Material, Mesh, Primitive};
     use glam::{DVec3, Vec3};
 
     /// A strip of quads along x, under two nodes of which one is called "ground".
@@ -156,6 +163,20 @@ mod tests {
         }
         let whole = SplitBy::HeightField { columns: 1, rows: 1 };
         assert!(split_nodes(strip(), &[("ground".into(), whole)], 0.2).unwrap().pieces.is_empty());
+    }
+
+    #[test]
+    fn pieces_overlap_unless_they_blend() {
+        let widths = |alpha: AlphaMode| {
+            let mut scene = strip();
+            scene.materials.push(Material { alpha, ..Material::default() });
+            scene.meshes[0].primitives[0].material = Some(0);
+            let by = SplitBy::HeightField { columns: 4, rows: 1 };
+            let found = split_nodes(scene, &[("ground".into(), by)], 0.2).unwrap();
+            found.scene.meshes[1..].iter().map(|m| m.bounds().size().x).collect::<Vec<f64>>()
+        };
+        assert_eq!(widths(AlphaMode::Blend), [2.0; 4]);
+        assert!(widths(AlphaMode::Opaque).iter().all(|&width| width > 2.1));
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! Pre-splitting: large and hollow meshes cut into pieces whose hulls hold little air, so that what is inside of
 //! them, or flies through them, need not be merged with them [Snyder & Lengyel 1997, §9].
 //!
-//! Space is halved by planes again and again. Each piece keeps a margin of its neighbours' surface: without it a
-//! seam would show, since compositing takes the edges that meet there as independent. Where two pieces overlap
-//! both show the same, so either may be in front: the plane on which their paths parted is the [`Seam`] to tell
-//! the sort of ([`Known::Plane`](super::Known::Plane)).
+//! Space is halved by planes again and again. Each piece keeps a margin of its neighbours' surface, so that no gap
+//! shows at a seam. Where two pieces overlap both show the same, so either may be in front: the plane on which their
+//! paths parted is the [`Seam`] to tell the sort of ([`Known::Plane`](super::Known::Plane)). Only where surfaces blend
+//! must pieces not overlap: each of them would tint what is behind.
 //!
 //! Beside the paper's grids there is the splitting that it leaves to the future: the piece whose hull reaches
 //! farthest from its surface is halved next, along the axis and at the place that bring the halves closest to
@@ -68,7 +68,8 @@ pub struct SplitMesh {
 }
 
 /// Cuts a mesh. `overlap` is the share by which a cell is larger than without it: 0.2 adds a tenth of a cell on
-/// each side. Cost: triangles times the depth of the halving; the adaptive way makes hulls at every step.
+/// each side. With 0 no two pieces share any of the surface, which a mesh that blends wants. Cost: triangles times the
+/// depth of the halving; the adaptive way makes hulls at every step.
 pub fn split(mesh: &Mesh, by: &SplitBy, overlap: f64) -> SplitMesh {
     let bounds = mesh.bounds();
     let mut out = Output { cuts: 0, split: SplitMesh::default(), paths: Vec::new() };
@@ -187,7 +188,13 @@ impl Output {
         self.cuts += 1;
         let with = |above| path.iter().copied().chain([Cut { id, normal, offset, above }]).collect();
         let below = clipped(faces, normal, offset + margin);
-        let above = clipped(faces, -normal, -(offset - margin));
+        let mut above = clipped(faces, -normal, -(offset - margin));
+        if margin == 0.0 {
+            // What lies in the plane is below.
+            above.retain(|(corners, _)| {
+                corners.iter().any(|c| normal.dot(c.position.as_dvec3()) - offset != 0.0)
+            });
+        }
         [(below, with(false)), (above, with(true))]
     }
 
@@ -425,6 +432,16 @@ mod tests {
             .iter()
             .map(|&[a, b, c]| (corner(b) - corner(a)).cross(corner(c) - corner(a)).length() * 0.5)
             .sum()
+    }
+
+    #[test]
+    fn a_flat_mesh_in_the_plane_of_a_cut_is_in_one_piece_only() {
+        let mut mesh = bowl(17);
+        mesh.positions.iter_mut().for_each(|p| p.y = 0.0);
+        for by in [SplitBy::Boxes([2, 4, 1]), SplitBy::Cylinder { sectors: 2, heights: 3 }] {
+            let total: f64 = split(&mesh, &by, 0.0).pieces.iter().map(area).sum();
+            assert!((total - area(&mesh)).abs() < 1e-4, "{by:?}: {total} of {}", area(&mesh));
+        }
     }
 
     #[test]

@@ -4,9 +4,29 @@ use super::{Layer, Taken};
 use crate::console::Verbosity;
 use crate::failure::Failure;
 use crate::numbers::{grouped, short};
+use crate::timeline::Timeline;
+use hither::Scene;
 use hither::conventions::View;
 use hither::layers::{LayerPainter, PaintOptions};
 use serde_json::{Value, json};
+
+/// A scene as it was before some of it was split.
+pub struct Direct(Option<(Scene, LayerPainter)>);
+
+impl Direct {
+    /// Keeps a copy of the scene, if one is needed.
+    pub fn of(scene: &Scene, needed: bool) -> Direct {
+        Direct(needed.then(|| (scene.clone(), LayerPainter::new(scene))))
+    }
+
+    /// What draws it as it is posed in a frame; `None` if there is no copy.
+    pub fn painter(&mut self, timeline: &Timeline, frame: u32) -> Result<Option<&mut LayerPainter>, Failure> {
+        let Some((scene, painter)) = &mut self.0 else { return Ok(None) };
+        timeline.pose_scene(scene, frame)?;
+        painter.pose(scene);
+        Ok(Some(painter))
+    }
+}
 
 /// Draws the picture directly, says how the composite differs, and counts pixels by what may make them differ.
 pub fn verify(
