@@ -139,8 +139,31 @@ fn layers_are_left_out_replaced_blurred_and_reused() {
     let json = report(&reuse);
     let rate = json["reuse"]["update_rate_unit"].as_f64().unwrap();
     assert!((0.0..0.9).contains(&rate), "{rate}");
-    let refused = hither(&["layers", WORLD, "-o", &folder.path("x.ora"), "--focus", "0"]);
-    assert_eq!(refused.status.code(), Some(2));
+}
+
+#[test]
+fn what_is_no_lens_is_refused_before_anything_is_written_and_a_huge_one_is_none_too_large() {
+    let folder = Folder::new("lens");
+    let output = folder.path("x.ora");
+    let usual = ["layers", WORLD, "-o", &output, "--size", "16x16", "-q"];
+    for wrong in [
+        &["--focus", "-1"][..],
+        &["--focus", "0"],
+        &["--focus", "nan"],
+        &["--focus", "inf"],
+        &["--focus", "1", "--f-number", "0"],
+        &["--focus", "1", "--focal-length", "-5"],
+        &["--focus", "1", "--focal-length", "nan"],
+        &["--focus", "1", "--lens-samples", "0"],
+        &["--focus", "1", "--lens-samples", "4000000000"],
+    ] {
+        let refused = hither(&[&usual[..], wrong].concat());
+        assert_eq!(refused.status.code(), Some(2), "{wrong:?}");
+        assert_eq!(fs::read_dir(&folder.0).unwrap().count(), 0, "{wrong:?}");
+    }
+    let huge = ["--focus", "0.1", "--f-number", "1e-15", "--focal-length", "1e15", "--lens-samples", "3"];
+    let json = report(&[&usual[..], &huge[..], &["--json", "-"]].concat());
+    assert_eq!(json["frames"][0]["depth_of_field"]["lens_samples"], 3);
 }
 
 #[test]

@@ -101,6 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let to = arguments.report.json.as_deref();
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
     arguments.layers.check()?;
+    arguments.focus.check()?;
     let files = check_outputs(arguments, format)?;
     arguments.view.check_size()?;
     // A picture, and what draws and holds one layer.

@@ -137,20 +137,27 @@ fn scatter(canvas: &mut Canvas, layer: &Painted, view: &View, lens: &Lens) {
     }
 }
 
+/// Offsets in the lens are looked at up to so many steps from its middle: whole pixels, or several where it is larger.
+const STEPS: i32 = 512;
+/// The radius of a lens counts as no larger than this, in pixels at the focus: pictures are moved by so many at most.
+const LARGEST_LENS_PX: f64 = 1e9;
+
 /// Where the pinhole is moved for the truth: offsets right and up in view space, metres, and by how many whole
-/// pixels the picture from there must be moved right and down so that what is in focus stays. About `count`,
-/// spread evenly over the lens; fewer if the lens is so small that they would fall together.
+/// pixels the picture from there must be moved right and down so that what is in focus stays. At most `count`,
+/// spread evenly over the lens; fewer if the lens is so small that they would fall together, and never more than some
+/// 800,000.
 pub fn lens_offsets(view: &View, lens: &Lens, count: usize) -> Vec<([f64; 2], [i32; 2])> {
     // A whole pixel at the focus is this far on the lens.
     let pixel = lens.focus / view.pixels_per_unit();
-    let radius = 0.5 * lens.aperture / pixel;
-    let reach = radius.floor() as i32;
+    let radius = (0.5 * lens.aperture / pixel).min(LARGEST_LENS_PX);
+    let step = (radius.floor() as i32 / STEPS + 1).max(1);
+    let radius_steps = radius / f64::from(step);
+    let reach = radius_steps.floor() as i32;
     let mut all: Vec<[i32; 2]> = (-reach..=reach)
         .flat_map(|y| (-reach..=reach).map(move |x| [x, y]))
-        .filter(|[x, y]| f64::from(x * x + y * y) <= radius * radius)
+        .filter(|[x, y]| f64::from(x * x + y * y) <= radius_steps * radius_steps)
         .collect();
-    let stride = all.len().div_ceil(count.max(1)).max(1);
-    if stride > 1 {
+    if all.len() > count.max(1) {
         // A stride through the rows would leave stripes; order by a low-discrepancy sequence instead.
         let key = |[x, y]: &[i32; 2]| {
             (f64::from(*x) * 0.754_877_666 + f64::from(*y) * 0.569_840_291).rem_euclid(1.0)
@@ -158,7 +165,8 @@ pub fn lens_offsets(view: &View, lens: &Lens, count: usize) -> Vec<([f64; 2], [i
         all.sort_by(|a, b| key(a).total_cmp(&key(b)));
         all.truncate(count.max(1));
     }
-    all.into_iter().map(|[x, y]| ([f64::from(x) * pixel, f64::from(-y) * pixel], [x, y])).collect()
+    let shifts = all.into_iter().map(|offset| offset.map(|steps| steps * step));
+    shifts.map(|[x, y]| ([f64::from(x) * pixel, f64::from(-y) * pixel], [x, y])).collect()
 }
 
 /// The view from a point of the lens.
@@ -195,4 +203,49 @@ pub fn rms_difference(a: &Canvas, b: &Canvas) -> f64 {
     let squares =
         a.pixels.as_flattened().iter().zip(b.pixels.as_flattened()).map(|(a, b)| f64::from(a - b).powi(2));
     (squares.sum::<f64>() / a.pixels.as_flattened().len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    fn view() -> View {
+        let projection = Projection::Perspective { fov_y: 1.0, near: 0.1 };
+        View::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, projection, (64, 64))
+    }
+
+    /// A lens in focus at 2 m with a radius of so many pixels there.
+    fn lens(view: &View, radius_px: f64) -> Lens {
+        let focus = 2.0;
+        Lens { focus, aperture: 2.0 * radius_px * focus / view.pixels_per_unit() }
+    }
+
+    #[test]
+    fn a_small_lens_has_every_whole_pixel_and_none_twice() {
+        let view = view();
+        let disc = |radius: i32| {
+            let side = -radius..=radius;
+            let all = side.clone().flat_map(|y| side.clone().map(move |x| x * x + y * y));
+            all.filter(|square| *square <= radius * radius).count()
+        };
+        for radius in [0, 1, 7, 50] {
+            let found = lens_offsets(&view, &lens(&view, f64::from(radius) + 1e-6), usize::MAX);
+            assert_eq!(found.len(), disc(radius));
+        }
+    }
+
+    #[test]
+    fn no_lens_is_too_large() {
+        let view = view();
+        for radius in [300.0, 512.5, 600.0, 1e5, 1e12, 1e300, f64::INFINITY, f64::NAN] {
+            let found = lens_offsets(&view, &lens(&view, radius), 20);
+            assert_eq!(found.len(), 20, "{radius}");
+            let reach = found.iter().map(|(_, [x, y])| f64::from(*x).hypot(f64::from(*y)));
+            let reach = reach.fold(0.0, f64::max);
+            let radius = radius.min(LARGEST_LENS_PX);
+            assert!(reach <= radius && reach > 0.6 * radius, "{reach} of {radius}");
+            assert!(lens_offsets(&view, &lens(&view, radius), usize::MAX).len() < 850_000);
+        }
+    }
 }

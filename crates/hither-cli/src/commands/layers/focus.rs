@@ -11,6 +11,7 @@ use hither::layers::depth_of_field::{
 };
 use hither::layers::{Canvas, LayerPainter, PaintOptions, Sprite};
 use serde_json::{Value, json};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// A lens.
@@ -20,13 +21,28 @@ pub struct FocusOptions {
     #[arg(long, value_name = "METRES", allow_hyphen_values = true, help_heading = "Lens")]
     focus: Option<f64>,
     /// The lens's f-number
-    #[arg(long, value_name = "N", default_value = "2.8", requires = "focus", help_heading = "Lens")]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "2.8",
+        requires = "focus",
+        allow_hyphen_values = true,
+        help_heading = "Lens"
+    )]
     f_number: f64,
     /// The lens's focal length, millimetres
-    #[arg(long, value_name = "MM", default_value = "50", requires = "focus", help_heading = "Lens")]
+    #[arg(
+        long,
+        value_name = "MM",
+        default_value = "50",
+        requires = "focus",
+        allow_hyphen_values = true,
+        help_heading = "Lens"
+    )]
     focal_length: f64,
     /// Also write the blurred single picture and the mean of N pictures from points of the lens, and compare
-    #[arg(long, value_name = "N", requires = "focus", help_heading = "Lens")]
+    #[arg(long, value_name = "N", requires = "focus", help_heading = "Lens",
+          value_parser = clap::value_parser!(u32).range(1..=65_536))]
     lens_samples: Option<u32>,
 }
 
@@ -35,7 +51,23 @@ const PICTURE: &str = "focus";
 const SINGLE: &str = "focus-single";
 const TRUTH: &str = "focus-truth";
 
+/// What each number of a lens may be; far beyond, its blur would be none.
+const RANGE: RangeInclusive<f64> = 1e-15..=1e15;
+
 impl FocusOptions {
+    /// Refuses what is no lens.
+    pub fn check(&self) -> Result<(), Failure> {
+        let Some(focus) = self.focus else { return Ok(()) };
+        let values = [focus, self.f_number, self.focal_length];
+        for (name, value) in ["--focus", "--f-number", "--focal-length"].iter().zip(values) {
+            if !RANGE.contains(&value) {
+                let what = "write a number above 0, from 1e-15 to 1e15";
+                return Err(Failure::usage(format!("{name} {value}: {what}")));
+            }
+        }
+        Ok(())
+    }
+
     /// The files that are written for the layers in `output`.
     pub fn pictures(&self, format: Format, output: &Path) -> impl Iterator<Item = PathBuf> {
         let names: &[&str] = match (self.focus, self.lens_samples) {
@@ -67,13 +99,6 @@ pub fn run(
     verbosity: Verbosity,
 ) -> Result<Option<Value>, Failure> {
     let Some(focus) = options.focus else { return Ok(None) };
-    let positive = |value: f64, name: &str| match value.is_finite() && value > 0.0 {
-        true => Ok(()),
-        false => Err(Failure::usage(format!("{name} {value}: write a number above 0"))),
-    };
-    positive(focus, "--focus")?;
-    positive(options.f_number, "--f-number")?;
-    positive(options.focal_length, "--focal-length")?;
     let lens = Lens::of(focus, options.f_number, options.focal_length);
     let size = (view.width, view.height);
     let blurred: Vec<Sprite> = taken.layers.iter().map(|l| blur_layer(&l.painted, view, &lens)).collect();
@@ -87,13 +112,16 @@ pub fn run(
     let single = blur_whole(&whole, view, &lens);
     let sharp = Canvas { width: size.0, height: size.1, pixels: whole.sprite.expanded(size.0, size.1) };
     let offsets = lens_offsets(view, &lens, samples as usize);
-    let mut pictures = Vec::with_capacity(offsets.len());
-    for (offset, shift) in &offsets {
-        let from = draw(painter, &view_from(view, *offset))?;
+    let mut failed = None;
+    let pictures = offsets.iter().map_while(|(offset, shift)| {
+        let from = draw(painter, &view_from(view, *offset)).map_err(|e| failed = Some(e)).ok()?;
         let pixels = from.sprite.expanded(size.0, size.1);
-        pictures.push((Canvas { width: size.0, height: size.1, pixels }, *shift));
+        Some((Canvas { width: size.0, height: size.1, pixels }, *shift))
+    });
+    let truth = accumulate(size, pictures);
+    if let Some(failed) = failed {
+        return Err(failed);
     }
-    let truth = accumulate(size, pictures.into_iter());
     write(output, SINGLE, &single, verbosity)?;
     write(output, TRUTH, &truth, verbosity)?;
     let errors = [&layered, &single, &sharp].map(|c| rms_difference(c, &truth));
