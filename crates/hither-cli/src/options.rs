@@ -84,8 +84,8 @@ impl ViewOptions {
     }
 
     /// Refuses a picture that the operating system would not give the memory for, so far as it says so beforehand:
-    /// better now than in the middle of it.
-    pub fn check_memory(&self, bytes_a_pixel: u64) -> Result<(), Failure> {
+    /// better now than in the middle of it. `remedy` is what to choose instead.
+    pub fn check_memory(&self, bytes_a_pixel: u64, remedy: &str) -> Result<(), Failure> {
         let (width, height) = self.size;
         let bytes = u64::from(width) * u64::from(height) * bytes_a_pixel;
         let mut room = Vec::<u8>::new();
@@ -98,7 +98,7 @@ impl ViewOptions {
         let gibibytes = bytes as f64 / f64::from(1 << 30);
         Err(Failure::work(format!(
             "a picture of {width}x{height} pixels needs {gibibytes:.1} GiB of memory, more than there is; \
-             choose a smaller --size"
+             choose {remedy}"
         )))
     }
 }

@@ -167,6 +167,28 @@ fn what_is_no_lens_is_refused_before_anything_is_written_and_a_huge_one_is_none_
 }
 
 #[test]
+fn samples_count_in_the_size_and_in_the_memory_that_a_picture_needs() {
+    let folder = Folder::new("samples");
+    // The scene does not exist; that the size is named shows which was looked at first.
+    let refused =
+        hither(&["layers", "no.glb", "-o", &folder.path("x.ora"), "--size", "9000x9", "--samples", "2"]);
+    let text = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!((refused.status.code(), text.lines().count()), (Some(1), 1));
+    assert!(text.contains("18000x18 samples") && text.contains("16384"), "{text}");
+    if !cfg!(target_os = "linux") {
+        return;
+    }
+    let command = format!(
+        "ulimit -v 2000000 && exec '{}' layers no.glb --json - --size 4000x4000 --samples 4",
+        env!("CARGO_BIN_EXE_hither")
+    );
+    let refused = Command::new("sh").args(["-c", &command]).output().unwrap();
+    let text = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!((refused.status.code(), text.lines().count()), (Some(1), 1));
+    assert!(text.contains("4000x4000") && text.contains("GiB") && text.contains("--samples"), "{text}");
+}
+
+#[test]
 fn parts_that_pass_through_each_other_are_merged_or_held_out() {
     let layers = |options: &[&str]| {
         let usual = ["layers", WORLD, "--size", "640x360", "--verify", "--json", "-", "-q"];

@@ -83,13 +83,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     planes::check_map(arguments, &mut files)?;
     files.reports(to)?;
     arguments.view.check_size()?;
-    arguments.view.check_memory(match arguments.method {
+    let bytes_a_pixel = match arguments.method {
         // A depth, and its share of blocks and tiles.
         MethodName::Buffer => 6,
         MethodName::Planes => 0,
         // The depth buffer with ids, and the frame.
         MethodName::Exact => 22,
-    })?;
+    };
+    arguments.view.check_memory(bytes_a_pixel, "a smaller --size")?;
     let mut scene = source::open_surfaces(&arguments.scene, &files, verbosity)?;
     if arguments.method == MethodName::Planes {
         planes::check_scene(&scene, &arguments.scene)?;

@@ -18,7 +18,7 @@ use crate::source;
 use crate::timeline::Timeline;
 use focus::FocusOptions;
 use hither::Scene;
-use hither::conventions::View;
+use hither::conventions::{MAX_IMAGE_SIDE, View};
 use hither::layers::{
     Canvas, Component, Expression, Holdout, LayerPainter, Openness, PaintOptions, Painted, Program, Sprite,
 };
@@ -103,9 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.layers.check()?;
     arguments.focus.check()?;
     let files = check_outputs(arguments, format)?;
-    arguments.view.check_size()?;
-    // A picture, and what draws and holds one layer.
-    arguments.view.check_memory(32)?;
+    check_size(arguments)?;
     let mut scene = source::open_surfaces(&arguments.scene, &files, verbosity)?;
     let mut direct = verify::Direct::of(&scene, arguments.verify && arguments.parts.splits());
     let prepared = arguments.parts.prepare(&mut scene, &arguments.scene)?;
@@ -166,6 +164,24 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     json.insert("frames".into(), frames.into());
     outputs::write_report(to, &json.into())
+}
+
+/// Refuses a picture, or one of all its samples, that is too large, or that there is no memory for.
+fn check_size(arguments: &Arguments) -> Result<(), Failure> {
+    let (view, samples) = (&arguments.view, arguments.samples);
+    view.check_size()?;
+    let (width, height) = (view.size.0 * samples, view.size.1 * samples);
+    if width.max(height) > MAX_IMAGE_SIDE {
+        let sides = format!("{width}x{height} samples, and up to {MAX_IMAGE_SIDE} a side can be drawn");
+        let what = "choose a smaller --size or fewer --samples";
+        return Err(Failure::work(format!("--samples {samples}: the picture has {sides}; {what}")));
+    }
+    // A picture; and of each sample a depth, two ids, a colour and, where a pixel has several, what is open. Layers
+    // need more, by how much of the picture they cover.
+    match u64::from(samples) {
+        1 => view.check_memory(16 + 28, "a smaller --size"),
+        samples => view.check_memory(16 + 32 * samples * samples, "a smaller --size or fewer --samples"),
+    }
 }
 
 /// Refuses what could not be written, or would be written over something else that is named.

@@ -55,7 +55,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     arguments.view.check_size()?;
     // The depth buffer and the frame, and the picture with what its file holds of each pixel.
-    arguments.view.check_memory(if format == Some(PictureFormat::Exr) { 66 } else { 26 })?;
+    let bytes_a_pixel = if format == Some(PictureFormat::Exr) { 66 } else { 26 };
+    arguments.view.check_memory(bytes_a_pixel, "a smaller --size")?;
     let start = Instant::now();
     let mut scene = source::open_surfaces(&arguments.scene, &files, verbosity)?;
     let read_time = start.elapsed();
