@@ -44,7 +44,8 @@ pub struct Arguments {
     /// How the layers are coloured
     #[arg(long, value_name = "NAME", default_value = "smooth")]
     shade: ShadeName,
-    /// Samples along each side of a pixel; with 1 the composite is the direct picture to the last bit
+    /// Samples along each side of a pixel; with 1 the composite is the direct picture to the last bit, up to rounding
+    /// where surfaces blend
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=16))]
     samples: u32,
     /// Leave out layers that show, and so hide, nothing

@@ -10,9 +10,11 @@
 //! [`LayerPainter`] draws layers with [`render`](mod@crate::render); [`depth_of_field`](mod@depth_of_field) blurs each
 //! by its own circle of confusion, and [`reuse`](mod@reuse) warps what was drawn before instead of drawing it again.
 //!
-//! Where pixels are either covered or not, the composite is the direct picture to the last bit. Where coverage is
-//! fractional, each layer's is that of what the layers before it leave open ([`Openness`]), and the composite is the
-//! direct picture up to rounding, but for pixels that three layers of one cycle share.
+//! Where pixels are either covered or not, the composite is the direct picture to the last bit. Where surfaces blend it
+//! is so up to rounding, some 1e-7: the direct picture blends them one after the other, here a layer's are blended
+//! first, and in floating point that is not quite the same. Where coverage is fractional, each layer's is that of what
+//! the layers before it leave open ([`Openness`]), and the composite is the direct picture up to rounding, but for
+//! pixels that three layers of one cycle share.
 
 mod components;
 mod coverage;

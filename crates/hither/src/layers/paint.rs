@@ -3,7 +3,7 @@
 //! The scene is flattened once and indexed once. For each layer its instances are put in their places and the
 //! last layer's are shrunk to a point behind the eye, so that nothing is built anew. Instances keep their
 //! numbers, ties in depth are decided as in the whole picture, and a layer's pixels are the whole picture's to
-//! the last bit wherever it is in front.
+//! the last bit wherever it is in front and opaque.
 
 use super::coverage::Drawn;
 use super::sight::Holdout;
