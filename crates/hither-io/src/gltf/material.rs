@@ -4,6 +4,7 @@ use super::fault::{Fault, Oddities, malformed, part, quoted};
 use super::json::{self, Document, Index, TextureInfo, Whole};
 use glam::{DAffine2, DMat2, DVec2, Vec4};
 use hither::scene::{AlphaMode, Filter, Material, TextureRef, Wrap};
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 
 /// The document's materials, as meshes refer to them.
@@ -11,6 +12,8 @@ pub(super) struct Materials<'a> {
     document: &'a Document,
     /// Index in the scene of each of the document's materials; `None` if it is not used.
     scene_index: Vec<Option<u32>>,
+    /// The scene's materials of which copies without texture follow them.
+    bare: RefCell<Vec<u32>>,
 }
 
 impl<'a> Materials<'a> {
@@ -24,7 +27,7 @@ impl<'a> Materials<'a> {
         }
         let mut numbers = 0..;
         let scene_index = used.into_iter().map(|used| if used { numbers.next() } else { None }).collect();
-        Materials { document, scene_index }
+        Materials { document, scene_index, bare: RefCell::default() }
     }
 
     /// The scene's index for a primitive's material.
@@ -36,6 +39,23 @@ impl<'a> Materials<'a> {
                 let there = self.scene_index.len();
                 malformed(format!("it refers to material {}, but there are {there}", material.0))
             }
+        }
+    }
+
+    /// The scene's index for a copy of one of its materials, without the texture.
+    pub(super) fn without_texture(&self, material: u32) -> u32 {
+        let mut bare = self.bare.borrow_mut();
+        let at = bare.iter().position(|&known| known == material).unwrap_or_else(|| {
+            bare.push(material);
+            bare.len() - 1
+        });
+        (self.used().count() + at) as u32
+    }
+
+    /// Appends the copies that were asked for.
+    pub(super) fn add_bare(&self, all: &mut Vec<Material>) {
+        for &material in &*self.bare.borrow() {
+            all.push(Material { texture: None, ..all[material as usize].clone() });
         }
     }
 

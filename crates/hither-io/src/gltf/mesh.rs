@@ -46,10 +46,14 @@ pub(super) fn read(
     }
     let mut vertices = Vertices::new(buffers, runs.iter().map(|(_, run)| &run.attributes));
     let ranges = ranges(&runs);
-    for (i, run) in runs {
+    let others_have_uvs = runs.iter().any(|(_, run)| run.attributes.uv.is_some());
+    for (i, mut run) in runs {
         let here = || format!("{place}, primitive {i}");
         if materials.is_textured(run.primitive.material) && run.attributes.uv.is_none() {
             oddities.note(here(), "lacks the texture coordinates that its material asks for");
+            if others_have_uvs {
+                run.material = run.material.map(|m| materials.without_texture(m));
+            }
         }
         let range = ranges[&run.attributes].clone();
         run.append(&mut mesh, &mut vertices, range).map_err(|f| f.at(here()))?;

@@ -102,7 +102,8 @@ fn assemble(buffers: &Buffers, companions: &dyn Companions, oddities: &mut Oddit
         used.iter().map(|&m| mesh::read(buffers, &materials, oddities, m)).collect::<Result<_, _>>()?;
     let textures = Textures::load(buffers, &materials, companions, oddities);
     let read_material = |m| material::read(document, oddities, m, |t| textures.scene_index(t));
-    let scene_materials = materials.used().map(read_material).collect();
+    let mut scene_materials = materials.used().map(read_material).collect();
+    materials.add_bare(&mut scene_materials);
     let cameras = camera::read(document, &hierarchy, oddities);
     let animations = animation::read(buffers, &hierarchy, oddities);
     for node in &mut hierarchy.group.nodes {

@@ -6,6 +6,7 @@ use crate::oddities::Oddities;
 use crate::polygon::{self, Fit, Triangulator};
 use glam::{Vec2, Vec3, Vec4};
 use hither::scene::{Content, Material, Mesh, Node, Primitive, Scene};
+use std::collections::HashMap;
 use std::ops::Range;
 
 /// Makes a mesh and a node of every part that has triangles or lines. A file that has faces, but none that can be
@@ -27,6 +28,7 @@ pub(super) fn build(
         statements,
         materials,
         default_material: None,
+        bare: HashMap::new(),
         triangulator: Triangulator::default(),
         cut: Vec::new(),
         outline: Vec::new(),
@@ -87,6 +89,8 @@ struct Builder<'a> {
     normals: Vec<Vec3>,
     materials: Materials,
     default_material: Option<u32>,
+    /// Copies of materials without their textures.
+    bare: HashMap<u32, u32>,
     triangulator: Triangulator,
     cut: Vec<[u32; 3]>,
     outline: Vec<Vec3>,
@@ -100,14 +104,18 @@ impl Builder<'_> {
         let uvs = self.attribute(runs, |[_, uv, _]| uv);
         for &at in runs {
             let run = self.statements.runs[at];
-            let first_triangle = mesh.triangles.len() as u32;
+            let (mut first_triangle, mut is_bare) = (mesh.triangles.len() as u32, false);
             for face in self.faces_of(at) {
+                if uvs == Presence::Mixed && is_bare != self.is_bare(face, run) {
+                    self.end_run(run, is_bare, first_triangle, &mut mesh);
+                    (first_triangle, is_bare) = (mesh.triangles.len() as u32, !is_bare);
+                }
                 if normals == Presence::Mixed {
                     self.give_normal(face);
                 }
                 self.face(face, &mut mesh.triangles, welder);
             }
-            self.end_run(run, first_triangle, &mut mesh);
+            self.end_run(run, is_bare, first_triangle, &mut mesh);
         }
         let vertices = welder.take();
         let of = |i: usize| vertices.iter().map(move |v| v.corner[i]);
@@ -158,6 +166,20 @@ impl Builder<'_> {
         let faces = &self.statements.faces;
         let start = if face == 0 { 0 } else { faces[face - 1].end as usize };
         start..faces[face].end as usize
+    }
+
+    /// Whether a face lacks the texture coordinates that its material asks for, beside faces that have some.
+    fn is_bare(&mut self, face: usize, run: Run) -> bool {
+        let material = self.material(run.material) as usize;
+        let bare = self.materials.list[material].texture.is_some()
+            && self.statements.corners[self.corners(face)].iter().any(|&[_, uv, _]| uv == NONE);
+        if bare {
+            self.note(
+                face,
+                "a face has no texture coordinates; it is drawn without the texture of its material",
+            );
+        }
+        bare
     }
 
     /// Gives the corners of a face that have no normal the face's own, so that it is drawn flat.
@@ -230,16 +252,26 @@ impl Builder<'_> {
         self.oddities.in_line(self.statements.faces[face].line.into(), kind);
     }
 
-    fn end_run(&mut self, run: Run, first_triangle: u32, mesh: &mut Mesh) {
+    /// The triangles from `first_triangle` on have the run's material; if they are bare, without its texture.
+    fn end_run(&mut self, run: Run, is_bare: bool, first_triangle: u32, mesh: &mut Mesh) {
         let end = mesh.triangles.len() as u32;
         if end == first_triangle {
             return;
         }
-        let material = Some(self.material(run.material));
+        let material = self.material(run.material);
+        let material = Some(if is_bare { self.without_texture(material) } else { material });
         match mesh.primitives.last_mut() {
             Some(last) if last.material == material => last.triangles.end = end,
             _ => mesh.primitives.push(Primitive { triangles: first_triangle..end, material }),
         }
+    }
+
+    fn without_texture(&mut self, material: u32) -> u32 {
+        let list = &mut self.materials.list;
+        *self.bare.entry(material).or_insert_with(|| {
+            list.push(Material { texture: None, ..list[material as usize].clone() });
+            (list.len() - 1) as u32
+        })
     }
 
     fn material(&mut self, name: u32) -> u32 {

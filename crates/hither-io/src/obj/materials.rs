@@ -125,6 +125,8 @@ fn parse(library: &str, bytes: &[u8], stated: &mut Vec<Stated>, oddities: &mut O
         if let Some(keyword) = text::word(&mut rest) {
             let place = || format!("{} line {number}", quoted(library.as_bytes()));
             let rest = rest.trim_ascii();
+            // Some software writes `map_kd`.
+            let keyword = &keyword.to_ascii_lowercase()[..];
             if keyword == b"newmtl" {
                 stated.push(Stated { name: rest.to_owned(), ..Stated::default() });
             } else if stated.len() > first
@@ -147,7 +149,7 @@ fn parse(library: &str, bytes: &[u8], stated: &mut Vec<Stated>, oddities: &mut O
 impl Stated {
     fn state(&mut self, keyword: &[u8], rest: &[u8], place: impl Fn() -> String, oddities: &mut Oddities) {
         match keyword {
-            b"Kd" => match numbers(rest)[..] {
+            b"kd" => match numbers(rest)[..] {
                 [r, g, b, ..] => self.color = Some([r, g, b]),
                 [grey] => self.color = Some([grey; 3]),
                 _ => oddities.note("Kd", place, || {
@@ -158,9 +160,9 @@ impl Stated {
                 let rest = rest.strip_prefix(b"-halo").unwrap_or(rest);
                 self.dissolve = numbers(rest).first().copied();
             }
-            b"Tr" => self.transparency = numbers(rest).first().copied(),
-            b"map_Kd" => self.map = Some(Map::new(rest)),
-            b"map_d" | b"map_Tr" => {
+            b"tr" => self.transparency = numbers(rest).first().copied(),
+            b"map_kd" => self.map = Some(Map::new(rest)),
+            b"map_d" | b"map_tr" => {
                 let message = || "a texture of transparency is left out; the surface stays as it is".into();
                 oddities.note("map_d", place, message);
             }
@@ -213,7 +215,9 @@ impl Map {
                     text::word(&mut rest);
                 }
                 _ => {
-                    map.file = before.trim_ascii().to_owned();
+                    let name = before.trim_ascii();
+                    let quoted = name.strip_prefix(b"\"").and_then(|rest| rest.strip_suffix(b"\""));
+                    map.file = quoted.unwrap_or(name).to_owned();
                     break;
                 }
             }

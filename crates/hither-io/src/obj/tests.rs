@@ -241,6 +241,34 @@ fn libraries_give_colour_transparency_and_textures() {
 }
 
 #[test]
+fn faces_without_texture_coordinates_are_drawn_without_the_texture() {
+    let files = |name: &str| match name {
+        "m.mtl" => Ok(b"NEWMTL wood\nkd 0.5 0.5 0.5\nMap_Kd \"wood grain.png\"\nnewmtl plain\n".to_vec()),
+        "wood grain.png" => Ok(png_of(1, 1, &[[1, 2, 3, 255]])),
+        other => Err(format!("no {other}")),
+    };
+    let read = |faces: &str| {
+        let text = format!("mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl wood\n{faces}");
+        from_bytes(Path::new("m.obj"), text.as_bytes(), &files).unwrap()
+    };
+    let textured = |loaded: &Loaded| -> Vec<bool> {
+        let mesh = &loaded.scene.meshes[0];
+        let material = |t| &loaded.scene.materials[mesh.material_of(t).unwrap() as usize];
+        let textured = |t| material(t).texture.is_some() && !mesh.uvs.is_empty();
+        (0..mesh.triangles.len() as u32).map(textured).collect()
+    };
+    let alone = read("f 1 2 3\n");
+    assert_eq!((textured(&alone), messages(&alone).len()), (vec![false], 0));
+    let mixed =
+        read("f 1 2 3\nf 1/1 2/1 3/1\nf 3/1 2/1 1/1\nf 1/1 2 3/1\nusemtl plain\nf 1 2 3\nf 1/1 2/1 3/1\n");
+    assert_eq!(textured(&mixed), [false, true, true, false, false, false]);
+    assert_eq!(mixed.scene.materials.len(), 3);
+    assert!(mixed.scene.materials.iter().all(|m| m.double_sided));
+    let told = messages(&mixed);
+    assert!(told.len() == 1 && told[0].starts_with("line 7: ") && told[0].ends_with("(2 times)"), "{told:?}");
+}
+
+#[test]
 fn several_libraries_on_a_line_are_found() {
     let files = |name: &str| match name {
         "a.mtl" => Ok(b"newmtl a\nKd 0 1 0".to_vec()),

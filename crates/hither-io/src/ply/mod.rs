@@ -3,8 +3,8 @@
 //! What becomes of a file:
 //! - The elements `vertex`, `face` and `tristrips` are read, other elements and properties passed over. Faces
 //!   of any number of corners are cut into triangles; those without area are dropped.
-//! - Of vertices: `x y z`, `nx ny nz`, colour (`red green blue alpha`; whole numbers count to their type's
-//!   largest, floats to 1; sRGB) and texture coordinates (`u v`, `s t`, `texture_u texture_v`; v up).
+//! - Of vertices: `x y z`, `nx ny nz`, colour (`red green blue alpha`; whole numbers of one and two bytes
+//!   count to their type's largest, longer ones to 255, floats to 1; sRGB) and texture coordinates (`u v`, `s t`, `texture_u texture_v`; v up).
 //! - Scans are often not closed: the material is double-sided. If some vertex is translucent, it blends.
 //! - A file that is shorter than its header says, or a list that claims more than is left, is refused. A face
 //!   with an index out of range, or with a coordinate that is no number, is left out with a diagnostic; where that is

@@ -2,6 +2,7 @@
 
 use super::{Scene, SceneError, Transform, fault};
 use crate::conventions::{Projection, View};
+use glam::{DAffine3, DMat3, DVec3};
 
 /// A named camera, fixed or carried by a node.
 #[derive(Clone, Debug)]
@@ -40,13 +41,24 @@ pub enum CameraProjection {
 }
 
 impl Scene {
-    /// What camera `index` sees in an image of `size` (width, height); `None` if there is no such camera.
+    /// World pose of camera `index`, following its node; `None` if there is no such camera.
     ///
-    /// Scale in the camera's node is ignored, as glTF asks.
+    /// Scale in and above the camera's node is ignored, as glTF asks. Where it has made axes that are not at right angles,
+    /// the camera looks along its −Z axis all the same, and up is where +Y is, as nearly as that allows.
+    pub fn world_from_camera(&self, index: usize) -> Option<DAffine3> {
+        let camera = self.cameras.get(index)?;
+        let node = match camera.node {
+            Some(n) => self.root_group().world_transform(n as usize),
+            None => DAffine3::IDENTITY,
+        };
+        Some(without_scale(node * camera.local.matrix()))
+    }
+
+    /// What camera `index` sees in an image of `size` (width, height); `None` if there is no such camera.
     pub fn view(&self, index: usize, size: (u32, u32)) -> Option<View> {
         let pose = self.world_from_camera(index)?;
         let (_, rotation, translation) = pose.to_scale_rotation_translation();
-        let world_from_view = glam::DAffine3::from_rotation_translation(rotation.normalize(), translation);
+        let world_from_view = DAffine3::from_rotation_translation(rotation.normalize(), translation);
         let projection = match self.cameras[index].projection {
             CameraProjection::Perspective { fov_y, near } => Projection::Perspective { fov_y, near },
             CameraProjection::Orthographic { half_width, half_height, near, far } => {
@@ -62,6 +74,23 @@ impl Scene {
         let by_name = self.cameras.iter().position(|c| c.name == name);
         by_name.or_else(|| name.parse::<usize>().ok().filter(|&i| i < self.cameras.len()))
     }
+}
+
+/// A rigid pose, with the −Z axis and, as nearly as may be, the +Y axis of `pose`; an axis that has no length is taken
+/// from the others.
+fn without_scale(pose: DAffine3) -> DAffine3 {
+    let axes = pose.matrix3;
+    if axes.determinant() > 0.0 && (axes.transpose() * axes).abs_diff_eq(DMat3::IDENTITY, 1e-9) {
+        return pose;
+    }
+    let unit = |v: DVec3| (v / v.abs().max_element()).try_normalize();
+    let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis].map(unit);
+    let (side, up) = (x.unwrap_or(DVec3::X), y.unwrap_or(DVec3::Y));
+    let back = z.or_else(|| unit(side.cross(up))).unwrap_or(DVec3::Z);
+    let right = unit(up.cross(back)).or_else(|| unit(side.reject_from_normalized(back)));
+    let right = right.unwrap_or_else(|| back.any_orthonormal_vector());
+    let matrix3 = DMat3::from_cols(right, back.cross(right), back);
+    DAffine3 { matrix3, translation: pose.translation }
 }
 
 pub(super) fn validate(scene: &Scene) -> Result<(), SceneError> {
@@ -90,4 +119,50 @@ pub(super) fn validate(scene: &Scene) -> Result<(), SceneError> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DQuat;
+
+    fn posed(scale: DVec3, turn: DQuat) -> (DAffine3, DAffine3) {
+        let pose = DAffine3::from_scale(scale) * DAffine3::from_quat(turn);
+        (pose, without_scale(pose))
+    }
+
+    #[test]
+    fn a_camera_under_uneven_scales_looks_along_its_own_axis() {
+        let turn = DQuat::from_axis_angle(DVec3::new(0.6, 0.8, 0.0), 0.9);
+        for scale in
+            [DVec3::new(10.0, 1.0, 1.0), DVec3::new(1.0, 0.2, -3.0), DVec3::splat(-2.0), DVec3::splat(1e-200)]
+        {
+            let (pose, rigid) = posed(scale, turn);
+            let axes = rigid.matrix3;
+            assert!((axes.transpose() * axes).abs_diff_eq(DMat3::IDENTITY, 1e-12), "{scale}");
+            assert!((axes.determinant() - 1.0).abs() < 1e-12, "{scale}");
+            let along = |axis: DVec3| (pose.matrix3 * axis * (1.0 / scale.abs().max_element())).normalize();
+            assert!(axes.z_axis.distance(along(DVec3::Z)) < 1e-12, "{scale}");
+            // Up is between the axis and the line of sight.
+            assert!(
+                axes.x_axis.dot(along(DVec3::Y)).abs() < 1e-12 && axes.y_axis.dot(along(DVec3::Y)) > 0.0,
+                "{scale}"
+            );
+        }
+        let (pose, rigid) = posed(DVec3::ONE, turn);
+        assert_eq!(pose, rigid);
+    }
+
+    #[test]
+    fn a_scale_of_zero_leaves_a_camera_that_can_be_used() {
+        for scale in
+            [DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.0, 1.0, 1.0), DVec3::new(0.0, 0.0, 1.0), DVec3::ZERO]
+        {
+            for turn in [DQuat::IDENTITY, DQuat::from_axis_angle(DVec3::Y, 0.5)] {
+                let axes = posed(scale, turn).1.matrix3;
+                assert!((axes.transpose() * axes).abs_diff_eq(DMat3::IDENTITY, 1e-12), "{scale}");
+            }
+        }
+        assert_eq!(posed(DVec3::new(1.0, 1.0, 0.0), DQuat::IDENTITY).1, DAffine3::IDENTITY);
+    }
 }

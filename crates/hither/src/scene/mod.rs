@@ -26,7 +26,6 @@ pub use nodes::{Content, Group, Instance, Node, Transform};
 pub use sample::{LINEAR_FROM_SRGB, Surface};
 
 use crate::geometry::Aabb;
-use glam::DAffine3;
 
 /// Everything there is to see. See the module's page for how the parts refer to each other.
 #[derive(Clone, Debug, Default)]
@@ -103,7 +102,8 @@ impl Scene {
         totals
     }
 
-    /// Bounds of everything shown, lines included, in world space; `None` for an empty scene.
+    /// A box around everything shown, lines included, in world space; `None` for an empty scene. It is put together from
+    /// the boxes of meshes, and larger than need be where nodes turn them. Cost: vertices stored, and nodes.
     pub fn bounds(&self) -> Option<Aabb> {
         let meshes: Vec<Aabb> = self.meshes.iter().map(|m| m.bounds().union(&m.bounds_of_lines())).collect();
         let mut groups: Vec<Aabb> = Vec::with_capacity(self.groups.len());
@@ -121,16 +121,6 @@ impl Scene {
         }
         let bounds = groups.get(self.root as usize).copied().unwrap_or(Aabb::EMPTY);
         (!bounds.is_empty()).then_some(bounds)
-    }
-
-    /// World pose of camera `index`, following its node; `None` if there is no such camera.
-    pub fn world_from_camera(&self, index: usize) -> Option<DAffine3> {
-        let camera = self.cameras.get(index)?;
-        let node = match camera.node {
-            Some(n) => self.root_group().world_transform(n as usize),
-            None => DAffine3::IDENTITY,
-        };
-        Some(node * camera.local.matrix())
     }
 
     /// Checks every reference and every number. Readers call it; code that builds scenes may.

@@ -57,6 +57,19 @@ fn the_material_chooses_the_texture_coordinates() {
         json!({ "index": 0, "texCoord": 7 });
     let (scene, odd) = build.odd_scene();
     assert!(scene.meshes[0].uvs.is_empty() && odd[0].contains("lacks the texture coordinates"), "{odd:?}");
+
+    // Beside one that has them, it is drawn as alone.
+    build.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = 0.into();
+    let mut bare = build.json["meshes"][0]["primitives"][0].clone();
+    bare["attributes"].as_object_mut().unwrap().retain(|name, _| !name.starts_with("TEXCOORD"));
+    build.json["meshes"][0]["primitives"].as_array_mut().unwrap().push(bare);
+    let (scene, odd) = build.odd_scene();
+    let mesh = &scene.meshes[0];
+    let is_textured = |t: usize| {
+        let material = mesh.material_of(t as u32).unwrap();
+        scene.materials[material as usize].texture.is_some()
+    };
+    assert!(is_textured(0) && !is_textured(mesh.triangles.len() - 1) && odd.len() == 1, "{odd:?}");
 }
 
 #[test]
