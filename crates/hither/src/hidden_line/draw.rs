@@ -91,11 +91,21 @@ impl Preparation {
             picture,
             counts: options.hidden,
         };
-        let mut pieces = trace_edges(&tracer, options, &mut counters);
+        let drawn = Choice::new(options.kinds, options.crease_angle, options.hidden);
+        // All lines bound faces, whichever of them are drawn.
+        let bounding = Kinds { marked: false, ..Kinds::ALL };
+        let wants_faces = options.faces.is_some() || options.hatch.is_some();
+        let bounding = wants_faces.then(|| Choice::new(bounding, 0.0, options.hidden));
+        let [mut pieces, mut bounds] = trace_edges(&tracer, [Some(drawn), bounding], options, &mut counters);
+        let edges = pieces.len();
         if options.kinds.intersection || options.kinds.contact || !shown.sections.is_empty() {
-            intersections::add(&tracer, options, &mut pieces, &mut counters);
+            intersections::add(&tracer, &options.kinds, &mut pieces, &mut counters);
         }
-        let faces = find_faces(&tracer, options, &mut pieces);
+        let mut faces = Vec::new();
+        if wants_faces {
+            add_meetings(&tracer, options, &pieces[edges..], &mut bounds, &mut counters);
+            faces = find_faces(&tracer, options, &bounds, &mut pieces);
+        }
         counters.segments = pieces.len() as u64;
         counters.visible_segments = pieces.iter().filter(|p| p.covers == 0).count() as u64;
         coincident::draw_once(crew, &mut pieces);
@@ -226,9 +236,14 @@ fn grid_over(placed: &[Placed], picture: DVec2, triangles: usize) -> Grid {
     Grid::over(min, max.max(min), side.clamp(8, MOST_CELLS))
 }
 
-/// Follows every edge that is to be drawn.
-fn trace_edges(tracer: &Tracer, options: &LineOptions, counters: &mut Counters) -> Vec<Piece> {
-    let choice = Choice::new(options.kinds, options.crease_angle, options.hidden);
+/// Follows every edge that is to be drawn by either choice, once, and gives its parts to each that draws it. Lines are
+/// counted of the first.
+fn trace_edges(
+    tracer: &Tracer,
+    choices: [Option<Choice>; 2],
+    options: &LineOptions,
+    counters: &mut Counters,
+) -> [Vec<Piece>; 2] {
     let shown = tracer.shown;
     let mut work = Vec::new();
     for (s, solid) in shown.solids.iter().enumerate() {
@@ -239,16 +254,19 @@ fn trace_edges(tracer: &Tracer, options: &LineOptions, counters: &mut Counters) 
     let hides = |t: u32| !see_through(t);
     let trace = |scratch: &mut Scratch, (s, range): (usize, std::ops::Range<usize>)| {
         let solid = &shown.solids[s];
-        let mut pieces = Vec::new();
+        let mut pieces = [Vec::new(), Vec::new()];
         let mut lines = 0;
         for edge in &solid.topology.edges[range] {
-            let Some(kind) = choice.kind(shown, solid, edge) else { continue };
+            let kinds = choices.each_ref().map(|c| c.as_ref()?.kind(shown, solid, edge));
+            if kinds == [None; 2] {
+                continue;
+            }
             let Some(ends) = shown.edge(solid, edge.vertices) else { continue };
             let (p, q) = (shown.screen[ends[0] as usize], shown.screen[ends[1] as usize]);
             if (q - p).truncate() == DVec2::ZERO {
                 continue;
             }
-            lines += 1;
+            lines += u64::from(kinds[0].is_some());
             let places = edge.triangles.map(|t| shown.place(solid, t));
             let live = places.map(|t| t != NONE && is_live(shown, t) && hides(t));
             let sheet = |k: usize| if live[k] { shown.sheet(solid, places[k]) } else { None };
@@ -258,36 +276,54 @@ fn trace_edges(tracer: &Tracer, options: &LineOptions, counters: &mut Counters) 
                 sheets: [0, 1].map(|k| sheet(k).unwrap_or(NO_SHEET)),
             };
             tracer.trace([p, q], &own, scratch);
-            push_parts(&mut pieces, p, q, solid.part, kind, scratch);
+            for (kind, pieces) in kinds.iter().zip(&mut pieces) {
+                if let Some(kind) = *kind {
+                    push_parts(pieces, p, q, solid.part, kind, scratch);
+                }
+            }
         }
         (pieces, lines, std::mem::take(&mut scratch.tests))
     };
     let found = shown.crew.map_with(work, || Scratch::new(tracer.occluders), trace);
-    let mut all = Vec::with_capacity(found.iter().map(|f| f.0.len()).sum());
+    let mut all = [0, 1].map(|k| Vec::with_capacity(found.iter().map(|f| f.0[k].len()).sum()));
     for (pieces, lines, tests) in found {
-        all.extend(pieces);
+        all.iter_mut().zip(pieces).for_each(|(all, pieces)| all.extend(pieces));
         counters.lines += lines;
         counters.tests += tests;
     }
     all
 }
 
+/// Adds what bounds faces besides edges: meetings of surfaces, of which those of the kinds that are drawn have been
+/// `found`, and where planes cut.
+fn add_meetings(
+    tracer: &Tracer,
+    options: &LineOptions,
+    found: &[Piece],
+    bounds: &mut Vec<Piece>,
+    counters: &mut Counters,
+) {
+    if options.kinds.intersection && options.kinds.contact {
+        bounds.extend_from_slice(found);
+    } else {
+        let mut aside = Counters::default();
+        intersections::add(tracer, &Kinds::ALL, bounds, &mut aside);
+        counters.tests += aside.tests;
+    }
+    intersections::add_sections(tracer, true, bounds, &mut Counters::default());
+}
+
 /// The visible faces, if they are asked for, and hatching of them among the pieces.
-fn find_faces(tracer: &Tracer, options: &LineOptions, pieces: &mut Vec<Piece>) -> Vec<Face> {
-    if options.faces.is_none() && options.hatch.is_none() {
-        return Vec::new();
-    }
-    // All lines bound faces, whichever of them are drawn.
-    let kinds = Kinds { marked: false, ..Kinds::ALL };
-    let all = LineOptions { kinds, crease_angle: 0.0, ..options.clone() };
-    let mut aside = Counters::default();
-    let mut bounds = trace_edges(tracer, &all, &mut aside);
-    intersections::add(tracer, &all, &mut bounds, &mut aside);
-    intersections::add_sections(tracer, true, &mut bounds, &mut aside);
+fn find_faces(
+    tracer: &Tracer,
+    options: &LineOptions,
+    bounds: &[Piece],
+    pieces: &mut Vec<Piece>,
+) -> Vec<Face> {
     if let Some(spacing) = options.hatch {
-        pieces.extend(hatch::lines(&faces::find(tracer, &bounds, FaceColor::Flat), spacing));
+        pieces.extend(hatch::lines(&faces::find(tracer, bounds, FaceColor::Flat), spacing));
     }
-    options.faces.map_or_else(Vec::new, |color| faces::find(tracer, &bounds, color))
+    options.faces.map_or_else(Vec::new, |color| faces::find(tracer, bounds, color))
 }
 
 /// Whether a stroke is so short that it is rounding: what is left of a line in a corner where surfaces meet. A

@@ -7,12 +7,12 @@
 //! tolerance lies in it. The cut of an edge by a plane is computed the same for all triangles at that edge,
 //! so that the segments of neighbouring pairs meet in every bit.
 
+use super::Kinds;
 use super::draw::{Piece, is_live, push_parts};
 use super::drawing::{Counters, Kind};
 use super::shown::{SectionLine, Shown};
 use super::topology::{Mix, NONE, ordered};
 use super::trace::{NO_SHEET, Own, Scratch, Tracer};
-use super::{Kinds, LineOptions};
 use glam::DVec3;
 use std::collections::HashSet;
 use std::ops::Range;
@@ -37,8 +37,7 @@ struct Meeting {
 
 /// Finds the lines in which the live triangles meet, and those of sections; follows them, and adds their
 /// parts to `pieces`. Cost: the pairs of triangles that overlap on the paper and in depth.
-pub(super) fn add(tracer: &Tracer, options: &LineOptions, pieces: &mut Vec<Piece>, counters: &mut Counters) {
-    let kinds = &options.kinds;
+pub(super) fn add(tracer: &Tracer, kinds: &Kinds, pieces: &mut Vec<Piece>, counters: &mut Counters) {
     let wanted = kinds.intersection || kinds.contact;
     let (crew, list) = (tracer.shown.crew, &tracer.surfaces.list);
     let mut planes = Vec::new();
