@@ -324,11 +324,16 @@ fn what_is_odd_about_a_file_is_a_warning_and_its_picture_is_made() {
     assert!(frame["pixels_covered"].as_u64().unwrap() > 100, "{frame}");
 }
 
-/// A triangle seen by cameras called `names`, the first of which is at a node scaled by 0, with an animation.
+/// A field of view, radians, for which no number says how large what it shows is drawn.
+const NARROW: &str = "1e-310";
+
+/// A triangle seen by cameras called `names`, the first of which sees too little to be drawn and is at a node scaled by 0,
+/// with an animation.
 fn gltf(names: &[&str], mode: u32) -> String {
     let names: Vec<String> = names.iter().map(|name| serde_json::to_string(name).unwrap()).collect();
-    let lens = r#""type":"perspective","perspective":{"yfov":1.0,"znear":0.1}"#;
-    let cameras: Vec<String> = names.iter().map(|name| format!(r#"{{"name":{name},{lens}}}"#)).collect();
+    let lens = |fov| format!(r#""type":"perspective","perspective":{{"yfov":{fov},"znear":0.1}}"#);
+    let camera = |(i, name)| format!(r#"{{"name":{name},{}}}"#, lens(if i == 0 { NARROW } else { "1.0" }));
+    let cameras: Vec<String> = names.iter().enumerate().map(camera).collect();
     let nodes: Vec<String> = (0..names.len())
         .map(|i| {
             format!(r#"{{"name":{0},"camera":{i},"translation":[0,0,5],"scale":[{i},{i},{i}]}}"#, names[i])
@@ -395,16 +400,20 @@ fn names_out_of_files_and_of_files_act_on_no_terminal() {
 #[test]
 fn a_camera_that_cannot_be_used_is_named() {
     let folder = Folder::new("camera");
-    fs::write(folder.0.join("flat.gltf"), gltf(&["squashed", "two"], 4)).unwrap();
+    let file = gltf(&["narrow", "two"], 4);
+    fs::write(folder.0.join("flat.gltf"), &file).unwrap();
     let (scene, picture) = (folder.path("flat.gltf"), folder.path("x.png"));
     for command in ["render", "layers"] {
         refused(
             &[command, &scene, "-o", &picture.replace("png", "exr")],
             1,
-            &["flat.gltf: camera 0 (\"squashed\") cannot be used", "finite", "--camera"],
+            &["flat.gltf: camera 0 (\"narrow\") cannot be used", "sees so little", "--camera"],
         );
     }
     done(&["render", &scene, "-o", &picture, "--size", "8x8", "--camera", "two"]);
+    // The scale of 0 above it is no reason.
+    fs::write(folder.0.join("flat.gltf"), file.replace(NARROW, "1.0")).unwrap();
+    done(&["render", &scene, "-o", &picture, "--size", "8x8", "--camera", "narrow"]);
 }
 
 /// A triangle below ten nodes, each of which grows to 10³⁸ times its size within a second, and a camera whose planes are
