@@ -55,7 +55,7 @@ fn beyond(end: DVec2, more: DVec2, hooked: bool) -> Vec<DVec2> {
     if hooked { vec![end + more - aside, end + more + aside] } else { vec![end + more] }
 }
 
-/// Ends of lines: those in a cell of a grid, and in its neighbours nearer than a cell's side, are one.
+/// Ends of lines: those in a cell of a grid, and in its neighbours nearer than half a cell's side, are one.
 #[derive(Default)]
 struct Ends {
     points: Vec<DVec2>,

@@ -119,9 +119,9 @@ pub struct Counters {
     pub triangles: u64,
     /// Of these, left in for exact tests.
     pub triangles_live: u64,
-    /// Edges and intersections that were followed.
+    /// Edges and intersections that were followed to be drawn; not those that only bound faces.
     pub lines: u64,
-    /// Exact tests of a line against a triangle.
+    /// Exact tests of a line against a triangle, also of lines that only bound faces.
     pub tests: u64,
     /// Line segments before joining.
     pub segments: u64,
