@@ -102,8 +102,9 @@ pub fn warp(sprite: &Sprite, now_from_then: &DAffine2, size: (u32, u32)) -> Spri
     if sprite.is_empty() || now_from_then.matrix2.determinant().abs() < 1e-12 {
         return Sprite::default();
     }
-    let (x0, y0) = (f64::from(sprite.x), f64::from(sprite.y));
-    let (x1, y1) = (x0 + f64::from(sprite.width), y0 + f64::from(sprite.height));
+    // Between the outermost pixels and what is transparent around them it fades over half a pixel beyond the edge.
+    let (x0, y0) = (f64::from(sprite.x) - 0.5, f64::from(sprite.y) - 0.5);
+    let (x1, y1) = (x0 + f64::from(sprite.width) + 1.0, y0 + f64::from(sprite.height) + 1.0);
     let corners = [(x0, y0), (x1, y0), (x0, y1), (x1, y1)]
         .map(|(x, y)| now_from_then.transform_point2(DVec2::new(x, y)));
     let least = corners.iter().fold(DVec2::INFINITY, |m, c| m.min(*c)).floor() - 1.0;
@@ -177,6 +178,19 @@ mod tests {
             for x in 0..20 {
                 let from = if y >= 3 { sprite.at(x + 2, y - 3) } else { [0.0; 4] };
                 assert_eq!(moved.at(x, y), from);
+            }
+        }
+    }
+
+    #[test]
+    fn what_grows_fades_at_its_edges() {
+        let sprite = Sprite { x: 1, y: 1, width: 1, height: 1, pixels: vec![[1.0; 4]] };
+        let grown = warp(&sprite, &DAffine2::from_scale(DVec2::splat(8.0)), (24, 24));
+        for y in 0..24 {
+            for x in 0..24 {
+                let [dx, dy] = [x, y].map(|at: u32| (f64::from(at) + 0.5 - 12.0).abs() / 8.0);
+                let expected = (1.0 - dx).max(0.0) * (1.0 - dy).max(0.0);
+                assert!((f64::from(grown.at(x, y)[3]) - expected).abs() < 1e-6, "({x}, {y})");
             }
         }
     }
