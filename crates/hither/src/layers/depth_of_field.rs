@@ -145,8 +145,12 @@ const LARGEST_LENS_PX: f64 = 1e9;
 /// Where the pinhole is moved for the truth: offsets right and up in view space, metres, and by how many whole
 /// pixels the picture from there must be moved right and down so that what is in focus stays. At most `count`,
 /// spread evenly over the lens; fewer if the lens is so small that they would fall together, and never more than some
-/// 800,000.
+/// 800,000. In an orthographic view, whose rays are parallel wherever it is, the middle alone: nothing is blurred
+/// there ([`Lens::radius_px`]).
 pub fn lens_offsets(view: &View, lens: &Lens, count: usize) -> Vec<([f64; 2], [i32; 2])> {
+    if let Projection::Orthographic { .. } = view.projection {
+        return vec![([0.0; 2], [0; 2])];
+    }
     // A whole pixel at the focus is this far on the lens.
     let pixel = lens.focus / view.pixels_per_unit();
     let radius = (0.5 * lens.aperture / pixel).min(LARGEST_LENS_PX);
@@ -247,5 +251,14 @@ mod tests {
             assert!(reach <= radius && reach > 0.6 * radius, "{reach} of {radius}");
             assert!(lens_offsets(&view, &lens(&view, radius), usize::MAX).len() < 850_000);
         }
+    }
+
+    #[test]
+    fn parallel_rays_are_blurred_neither_in_layers_nor_in_the_truth() {
+        let view =
+            View { projection: Projection::Orthographic { half_height: 1.5, near: 0.1, far: 9.0 }, ..view() };
+        let lens = lens(&view, 8.0);
+        assert_eq!(lens.radius_px(&view, 5.0), 0.0);
+        assert_eq!(lens_offsets(&view, &lens, 400), [([0.0; 2], [0; 2])]);
     }
 }
