@@ -45,19 +45,68 @@ const STEP_PX: f64 = 0.25;
 /// Discs are not larger than this, pixels.
 const LARGEST_PX: f64 = 200.0;
 
-/// Discs by their radius in steps: offsets and weights that sum to one.
+/// Offsets and weights.
+type Disc = Vec<(i32, i32, f32)>;
+
+/// Whether a pixel is the first, and the last, of its row; and of its column.
+type Ends = [[bool; 2]; 2];
+
+/// Discs by their radius in steps, whose weights sum to one; and what becomes of them at the ends of rows and columns.
 #[derive(Default)]
-struct Discs(HashMap<u32, Vec<(i32, i32, f32)>>);
+struct Discs(HashMap<(u32, Ends), Disc>);
 
 impl Discs {
-    fn of(&mut self, radius: f64) -> &[(i32, i32, f32)] {
+    fn of(&mut self, radius: f64, ends: Ends) -> &[(i32, i32, f32)] {
         let steps = (radius.min(LARGEST_PX) / STEP_PX).round() as u32;
-        self.0.entry(steps).or_insert_with(|| disc(f64::from(steps) * STEP_PX))
+        self.0.entry((steps, ends)).or_insert_with(|| continued(disc(f64::from(steps) * STEP_PX), ends))
+    }
+}
+
+/// A disc together with those of all pixels that would lie beyond the ends, each as the one at the end, as far as they
+/// reach into the picture.
+fn continued(disc: Disc, [of_row, of_column]: Ends) -> Disc {
+    if of_row == [false; 2] && of_column == [false; 2] {
+        return disc;
+    }
+    let reach = disc.iter().map(|d| d.0.max(d.1)).max().unwrap_or(0);
+    let side = (2 * reach + 1) as usize;
+    let place = |x: i32, y: i32| (y + reach) as usize * side + (x + reach) as usize;
+    let mut square = vec![0.0; side * side];
+    disc.iter().for_each(|&(x, y, weight)| square[place(x, y)] = weight);
+    square.chunks_exact_mut(side).for_each(|row| continue_line(row, of_row));
+    for column in 0..side {
+        let mut line: Vec<f32> = square[column..].iter().step_by(side).copied().collect();
+        continue_line(&mut line, of_column);
+        square[column..].iter_mut().step_by(side).zip(line).for_each(|(to, weight)| *to = weight);
+    }
+    let all = (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| (x, y)));
+    all.map(|(x, y)| (x, y, square[place(x, y)])).filter(|d| d.2 > 0.0).collect()
+}
+
+/// The same for the weights of a line, around its middle.
+fn continue_line(line: &mut [f32], [first, last]: [bool; 2]) {
+    let middle = line.len() / 2;
+    match [first, last] {
+        [false, false] => {}
+        [true, true] => {
+            let sum = line.iter().sum();
+            line.fill(0.0);
+            line[middle] = sum;
+        }
+        [true, false] => {
+            (middle..line.len() - 1).rev().for_each(|at| line[at] += line[at + 1]);
+            line[..middle].fill(0.0);
+        }
+        [false, true] => {
+            line.reverse();
+            continue_line(line, [true, false]);
+            line.reverse();
+        }
     }
 }
 
 /// Pixels are weighted by how far their centre is inside the rim.
-fn disc(radius: f64) -> Vec<(i32, i32, f32)> {
+fn disc(radius: f64) -> Disc {
     let reach = radius.ceil() as i32 + 1;
     let mut found = Vec::new();
     let mut sum = 0.0;
@@ -74,7 +123,8 @@ fn disc(radius: f64) -> Vec<(i32, i32, f32)> {
     found
 }
 
-/// A layer as the lens sees it alone. Cost: its pixels times the discs' areas.
+/// A layer as the lens sees it alone. What lies beyond the edge of the picture continues as the edge does, as in
+/// [`accumulate`]. Cost: its pixels times the discs' areas.
 pub fn blur_layer(layer: &Painted, view: &View, lens: &Lens) -> Sprite {
     let mut canvas = Canvas::new(view.width, view.height);
     scatter(&mut canvas, layer, view, lens);
@@ -127,7 +177,8 @@ fn scatter(canvas: &mut Canvas, layer: &Painted, view: &View, lens: &Lens) {
         let distance = if distance.is_finite() { distance } else { mean };
         let x = (sprite.x + i as u32 % sprite.width) as i32;
         let y = (sprite.y + i as u32 / sprite.width) as i32;
-        for &(dx, dy, weight) in discs.of(lens.radius_px(view, distance)) {
+        let ends = [[x == 0, x == width - 1], [y == 0, y == height - 1]];
+        for &(dx, dy, weight) in discs.of(lens.radius_px(view, distance), ends) {
             let (x, y) = (x + dx, y + dy);
             if x >= 0 && y >= 0 && x < width && y < height {
                 let target = &mut canvas.pixels[(y * width + x) as usize];
@@ -260,5 +311,39 @@ mod tests {
         let lens = lens(&view, 8.0);
         assert_eq!(lens.radius_px(&view, 5.0), 0.0);
         assert_eq!(lens_offsets(&view, &lens, 400), [([0.0; 2], [0; 2])]);
+    }
+
+    /// A layer at one distance, all of one colour, that covers some columns of the whole height.
+    fn stripe(view: &View, x: u32, width: u32, distance: f32) -> Painted {
+        let pixels = vec![[0.5, 0.25, 0.0, 1.0]; (width * view.height) as usize];
+        let distances = vec![distance; pixels.len()];
+        Painted { sprite: Sprite { x, y: 0, width, height: view.height, pixels }, distances }
+    }
+
+    #[test]
+    fn a_layer_goes_on_beyond_the_edge_of_the_picture() {
+        let near = |a: f32, b: f32| (a - b).abs() < 1e-4;
+        for (width, height) in [(64, 64), (64, 1), (1, 64), (1, 1), (3, 40)] {
+            let view = View { width, height, ..view() };
+            for radius in [0.0, 0.7, 5.0, 40.0] {
+                let lens = lens(&view, radius);
+                // It fills the view, at twice the distance in focus, and half of it.
+                for distance in [4.0, 1.0] {
+                    let whole = stripe(&view, 0, width, distance);
+                    let blurred = blur_layer(&whole, &view, &lens);
+                    assert_eq!(blurred.pixels.len(), whole.sprite.pixels.len());
+                    let same = |p: &[f32; 4]| near(p[3], 1.0) && near(p[0], 0.5) && near(p[1], 0.25);
+                    assert!(blurred.pixels.iter().all(same), "{width}x{height}, {radius} px");
+                }
+            }
+        }
+        // A stripe is blurred across, and alike from the top to the bottom.
+        let view = view();
+        let blurred = blur_layer(&stripe(&view, 20, 24, 4.0), &view, &lens(&view, 12.0));
+        for x in 0..64 {
+            let middle = blurred.at(x, 32)[3];
+            assert!((0..64).all(|y| near(blurred.at(x, y)[3], middle)), "column {x}");
+        }
+        assert!(near(blurred.at(32, 0)[3], 1.0) && near(blurred.at(20, 0)[3] + blurred.at(19, 0)[3], 1.0));
     }
 }
