@@ -21,8 +21,8 @@ struct Kept {
     sprite: Sprite,
 }
 
-/// The points of a layer on the screen, pixels; `None` if one is not in front of the eye's near plane or lies
-/// outside of the picture, where an earlier picture would have been cut off.
+/// The points of a layer on the screen, pixels; `None` if one is not beyond the eye's near plane and before the far one,
+/// if there is one, or lies outside of the picture, where an earlier picture would have been cut off.
 pub fn on_screen(view: &View, points: impl IntoIterator<Item = DVec3>) -> Option<Vec<DVec2>> {
     let (width, height) = (f64::from(view.width), f64::from(view.height));
     let scale = view.pixels_per_unit();
@@ -31,7 +31,8 @@ pub fn on_screen(view: &View, points: impl IntoIterator<Item = DVec3>) -> Option
         let by = match view.projection {
             Projection::Perspective { near, .. } if -p.z > near => scale / -p.z,
             Projection::Perspective { .. } => return None,
-            Projection::Orthographic { .. } => scale,
+            Projection::Orthographic { near, far, .. } if -p.z > near && -p.z < far => scale,
+            Projection::Orthographic { .. } => return None,
         };
         let at = DVec2::new(width * 0.5 + p.x * by, height * 0.5 - p.y * by);
         let inside = at.x >= 0.0 && at.y >= 0.0 && at.x <= width && at.y <= height;
@@ -192,6 +193,17 @@ mod tests {
                 let expected = (1.0 - dx).max(0.0) * (1.0 - dy).max(0.0);
                 assert!((f64::from(grown.at(x, y)[3]) - expected).abs() < 1e-6, "({x}, {y})");
             }
+        }
+    }
+
+    #[test]
+    fn what_a_plane_of_the_view_may_cut_is_nowhere_on_the_screen() {
+        let perspective = Projection::Perspective { fov_y: 1.0, near: 1.0 };
+        let orthographic = Projection::Orthographic { half_height: 2.0, near: 1.0, far: 5.0 };
+        for (projection, far_is_seen) in [(perspective, true), (orthographic, false)] {
+            let view = View::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, (40, 40));
+            let seen = |z: f64| on_screen(&view, [DVec3::new(0.1, 0.2, -2.0), DVec3::NEG_Z * z]).is_some();
+            assert_eq!([0.5, 1.5, 4.9, 5.5].map(seen), [false, true, true, far_is_seen]);
         }
     }
 }
