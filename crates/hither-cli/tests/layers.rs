@@ -339,3 +339,23 @@ fn transparent_scenes_are_those_sorted_at_every_pixel_and_cycles_are_named() {
         assert_eq!(said.contains("2 parts occlude each other both ways"), crossing, "{said}");
     }
 }
+
+#[test]
+fn a_picture_in_a_layers_place_does_not_move_with_it_when_layers_are_reused() {
+    let folder = Folder::new("replaced");
+    let whole = folder.path("whole");
+    done(&["layers", WORLD, "-o", &whole, "--size", "120x90", "-q"]);
+    let json = report(&["order", WORLD, "--json", "-", "-q"]);
+    let names: Vec<&str> =
+        json["parts"].as_array().unwrap().iter().map(|p| p["name"].as_str().unwrap()).collect();
+    // All parts, so that every frame is made of pictures that rest.
+    let pictures: Vec<String> = names.iter().map(|name| format!("{name}={whole}/composite.png")).collect();
+    let mut arguments = vec![
+        "layers", WORLD, "--size", "120x90", "--frames", "0..6", "--fps", "60", "--reuse", "8", "--json",
+        "-", "-q",
+    ];
+    pictures.iter().for_each(|picture| arguments.extend(["--replace", picture]));
+    let json = report(&arguments);
+    assert!(json["reuse"]["update_rate_unit"].as_f64().unwrap() < 1.0);
+    assert_eq!(json["reuse"]["rms_error"], 0.0);
+}

@@ -92,6 +92,8 @@ struct Layer {
     painted: Painted,
     /// Left out of the composite.
     out: bool,
+    /// Its picture is another.
+    replaced: bool,
     /// Samples that are cut because another layer is before them.
     held_out: u64,
 }
@@ -264,9 +266,10 @@ fn take_apart(
         let mut kept = Vec::new();
         for ((at, parts), mut painted) in (0u32..).zip(&component.layers).zip(painted) {
             let name = parts.iter().map(|&p| sorting.name(p)).collect::<Vec<_>>().join(" + ");
-            let mut out = false;
+            let (mut out, mut replaced) = (false, false);
             match replacement(parts) {
                 Some((_, Some(sprite))) => {
+                    replaced = true;
                     painted.distances = vec![f32::INFINITY; sprite.pixels.len()];
                     painted.sprite = sprite.clone();
                 }
@@ -278,7 +281,7 @@ fn take_apart(
             }
             kept.push(at);
             let held_out = parts.iter().find_map(|part| held_out.get(part)).map_or(0, Holdout::samples);
-            layers.push(Layer { name, parts: parts.clone(), painted, out, held_out });
+            layers.push(Layer { name, parts: parts.clone(), painted, out, replaced, held_out });
         }
         keep(component, &kept);
     }

@@ -61,12 +61,13 @@ impl Reuse {
             let fit = self.layers.recall(&layer.parts, all.as_deref(), self.budget_px).filter(|_| !several);
             let share = anew / layer.parts.len() as f64;
             layer.parts.iter().for_each(|_| self.count(false, fit.is_none(), share));
+            if fit.is_none() {
+                self.layers.keep(&layer.parts, all, layer.painted.sprite.clone());
+            }
             used.push(match fit.zip(self.layers.picture(&layer.parts)) {
-                Some((fit, earlier)) => warp(earlier, &fit.now_from_then, size),
-                None => {
-                    self.layers.keep(&layer.parts, all, layer.painted.sprite.clone());
-                    layer.painted.sprite.clone()
-                }
+                // Another picture in the layer's place does not move with it.
+                Some((fit, earlier)) if !layer.replaced => warp(earlier, &fit.now_from_then, size),
+                _ => layer.painted.sprite.clone(),
             });
         }
         let warped = taken.program.run(size, |l| (!taken.layers[l as usize].out).then(|| &used[l as usize]));
