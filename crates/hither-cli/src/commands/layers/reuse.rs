@@ -62,7 +62,8 @@ impl Reuse {
             let share = anew / layer.parts.len() as f64;
             layer.parts.iter().for_each(|_| self.count(false, fit.is_none(), share));
             if fit.is_none() {
-                self.layers.keep(&layer.parts, all, layer.painted.sprite.clone());
+                // Nor is what is cut a picture of the whole layer, for when nothing is cut from it.
+                self.layers.keep(&layer.parts, all.filter(|_| !several), layer.painted.sprite.clone());
             }
             used.push(match fit.zip(self.layers.picture(&layer.parts)) {
                 // Another picture in the layer's place does not move with it.
