@@ -2,15 +2,20 @@
 //!
 //! ```sh
 //! cargo run --release -p hither-bench --example cull_scene -- FILE|world:SPEC WIDTH HEIGHT [sampled] [coherence] [coarse=N]
-//!     [occluder=PX] [piece=PX] [face=PX] [pays=FACES] [frames=N] [samples=N] [exact] [camera=NAME]
+//!     [moving] [margin=MM] [occluder=PX] [piece=PX] [face=PX] [pays=FACES] [frames=N] [samples=N] [exact] [camera=NAME]
 //! ```
 //!
-//! The second line's are the thresholds of [`CullOptions`], how many frames are timed, samples a pixel each way (4; 0
+//! Moving, the eye goes and turns as one who walks at 1.5 m/s and looks around at 30°/s does in 30 frames a second,
+//! forwards and to the left; the last frame's is the camera's own. The margin is how far, millimetres, the eye may move
+//! while the answer stays true; then what is seen at pixels' centres from fourteen eyes at that distance counts as missing, too.
+//!
+//! The second line's others are the thresholds of [`CullOptions`], how many frames are timed, samples a pixel each way (4; 0
 //! for none), whether to compare with exact visibility, too, and the only camera.
 //!
 //! *Seen* are the instances that are nearest at a pixel's centre, and at one of 4×4 samples a pixel; exactly those of
 //! which `hidden_line` finds a visible face or line (it takes all surfaces for double-sided).
 
+use glam::{DAffine3, DVec3};
 use hither::conventions::View;
 use hither::cull::{CullOptions, Culler, Meaning};
 use hither::hidden_line::{Drawing, FaceColor, LineOptions, Preparation, PrepareOptions};
@@ -32,6 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let options = options(&arguments)?;
     let sampled = options.meaning == Meaning::Sampled;
     let (samples, frames) = (number_of("samples", 4)?, number_of("frames", 30)?);
+    let is_moving = arguments.iter().any(|a| a == "moving");
     let only = arguments.iter().find_map(|a| a.strip_prefix("camera="));
     let index = SceneIndex::build(scene, &IndexOptions::default());
     let exactly = arguments.iter().any(|a| a == "exact");
@@ -49,7 +55,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let view = index.scene().view(camera, size).ok_or("no camera")?;
         let mut times = Vec::new();
         let mut found = Default::default();
-        for _ in 0..frames {
+        for frame in (0..frames).rev() {
+            let before = if is_moving { f64::from(frame) } else { 0.0 };
+            let view = earlier(&view, before);
             let start = Instant::now();
             found = culler.cull(&index, &view, &options)?;
             times.push(start.elapsed().as_secs_f64() * 1e3);
@@ -60,7 +68,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             side => (seen(&index, &view, 1)?, seen(&index, &view, side)?),
         };
         let visible: HashSet<u32> = found.visible.iter().copied().collect();
-        let truth = if sampled { &at_centres } else { &finer };
+        let mut truth = if sampled { at_centres.clone() } else { finer.clone() };
+        if samples > 0 && options.eye_moves > 0.0 {
+            for moved in about(&view, options.eye_moves) {
+                truth.extend(seen(&index, &moved, 1)?);
+            }
+        }
         println!(
             "{:14} {:8.2} {:8.2} {:8} {:8} {:8}  {}; {:?}",
             index.scene().cameras[camera].name,
@@ -79,6 +92,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// Views from fourteen eyes that are as far from that of `view` as may be: along the axes, and between them.
+fn about(view: &View, distance: f64) -> Vec<View> {
+    let steps = (0..27).map(|i| DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)) - 1.0);
+    let steps = steps.filter(|step| step.length_squared() != 2.0 && *step != DVec3::ZERO);
+    let at = |step: DVec3| DAffine3::from_translation(step.normalize() * distance) * view.view_from_world;
+    steps.map(|step| View { view_from_world: at(step), ..*view }).collect()
+}
+
+/// A view of so many frames ago.
+fn earlier(view: &View, frames: f64) -> View {
+    let turn = DAffine3::from_rotation_y((-frames).to_radians());
+    let step = DAffine3::from_translation(DVec3::Z * (-0.05 * frames));
+    View { view_from_world: turn * step * view.view_from_world, ..*view }
+}
+
 fn number_of(arguments: &[String], name: &str, or: u32) -> Result<u32, std::num::ParseIntError> {
     let value = arguments.iter().find_map(|a| a.strip_prefix(name)?.strip_prefix('='));
     value.map_or(Ok(or), str::parse)
@@ -89,6 +117,7 @@ fn options(arguments: &[String]) -> Result<CullOptions, std::num::ParseIntError>
     let number_of = |name: &str, or: u32| number_of(arguments, name, or);
     let default = CullOptions::default();
     Ok(CullOptions {
+        eye_moves: f64::from(number_of("margin", 0)?) * 0.001,
         meaning: if is_said("sampled") { Meaning::Sampled } else { Meaning::Continuous },
         coherence: is_said("coherence"),
         coarseness: number_of("coarse", default.coarseness)?,

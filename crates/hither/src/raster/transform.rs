@@ -30,9 +30,15 @@ pub struct ScreenFromObject {
 impl ScreenFromObject {
     /// The transform of `view` alone, from world space.
     pub fn of_view(view: &View) -> ScreenFromObject {
+        ScreenFromObject::of_view_with_border(view, 0)
+    }
+
+    /// The same of an image with so many pixels more on each side.
+    pub(crate) fn of_view_with_border(view: &View, border: u32) -> ScreenFromObject {
         let sub = f64::from(SUBPIXEL);
         let scale = view.pixels_per_unit() * sub;
-        let (cx, cy) = (f64::from(view.width) * 0.5 * sub, f64::from(view.height) * 0.5 * sub);
+        let middle = |side: u32| (f64::from(side) * 0.5 + f64::from(border)) * sub;
+        let (cx, cy) = (middle(view.width), middle(view.height));
         let in_view = match view.projection {
             Projection::Perspective { near, .. } => ScreenFromObject {
                 x: [scale, 0.0, -cx, 0.0],

@@ -34,6 +34,8 @@ pub(crate) struct BoxView {
     /// What an orthographic depth changes by over so far: what lies before the near plane, or beyond the far one, by no
     /// more than that may come into view.
     pub depth_margin: f32,
+    /// Pixels on each side that are not of the image: there is what may come into view.
+    pub border: f32,
     /// What f64 lost of the rows' constants on the way here, pixels and units of W and of depth.
     lost: [f32; 4],
 }
@@ -94,6 +96,7 @@ impl BoxView {
             centres: false,
             margin: [0.0; 2],
             depth_margin: 0.0,
+            border: 0.0,
             lost: [x * (1.0 / 256.0), y * (1.0 / 256.0), third, third],
         }
     }
@@ -208,9 +211,11 @@ fn project_some<S: Simd>(
         let from = low[k] - margin - 1e-6;
         let to = high[k] + margin + 1e-6;
         within &= from.simd_gt(splat(-8000.0)) & to.simd_lt(splat(24000.0));
-        uncut &= from.simd_gt(ring) & to.simd_lt(ring * -1.0 + size);
+        // What may come into view, and whether it is within the border.
+        let (lowest, highest) = (ring * -1.0 + view.border, ring + (size - view.border));
+        uncut &= (from.simd_gt(ring) & to.simd_lt(ring * -1.0 + size)) | ring.simd_lt(view.border);
         // Asked this way round, what is no number is seen.
-        let unseen = from.simd_gt(ring + size) | to.simd_lt(ring * -1.0);
+        let unseen = from.simd_gt(highest) | to.simd_lt(lowest);
         inside &= !(unseen & clear);
         let far = splat(1e30);
         certain &= from.abs().simd_lt(far) & to.abs().simd_lt(far);
@@ -219,6 +224,9 @@ fn project_some<S: Simd>(
             first = (from - (0.5 + SNAP)).ceil().max(splat(0.0));
             last = (to - (0.5 - SNAP)).floor().min(splat(size - 1.0));
             inside &= !(first.simd_gt(last) & clear);
+        }
+        if view.border > 0.0 {
+            (first, last) = (first.max(lowest.floor()), last.min(highest.floor()));
         }
         rect[k] = first.max(splat(0.0)).min(splat(size - 1.0));
         rect[k + 2] = last.min(splat(size - 1.0)).max(splat(0.0));

@@ -7,6 +7,7 @@ use super::fill::{Corner, Goes, Joint, Outline, fill, first_pixel, last_pixel};
 use super::loose::{LooseFaces, Sixteen, fill_one, set_up};
 use super::mosaic::{Area, Drawing, Mosaic};
 use super::occluder::{ENDS, Face, Occluder, Patch};
+use super::pass::{MOST_MARGIN_PX, Pass};
 use super::place::{Placed, Placing, Sizes};
 use super::surface::Surface;
 use super::{Drawn, Margin};
@@ -37,11 +38,12 @@ pub(in crate::cull) struct Band {
 
 /// A part of an occluder's tree that may show.
 #[derive(Clone, Copy, Debug)]
-struct Open {
-    slot: Slot,
-    rect: [i32; 4],
-    depth: f32,
-    clear: bool,
+pub(super) struct Open {
+    pub slot: Slot,
+    pub rect: [i32; 4],
+    pub depth: f32,
+    pub farthest: f32,
+    pub clear: bool,
 }
 
 /// An occluder in its place.
@@ -162,10 +164,15 @@ impl Band {
                 Child::Leaf(patch) => {
                     let patch = &standing.occluder.patches[patch as usize];
                     let Some(bodies) = bodies(standing, patch, &open) else { continue };
-                    simd.vectorize(
-                        #[inline(always)]
-                        || self.draw_patch(simd, standing, patch, open, bodies, drawn),
-                    );
+                    let mut next = Pass::first(standing, open);
+                    while let Some(pass) = next {
+                        simd.vectorize(
+                            #[inline(always)]
+                            || self.draw_patch(simd, standing, patch, &pass, bodies, drawn),
+                        );
+                        // Bodies lie beyond all that must be cut.
+                        next = if bodies.is_empty() { pass.after(standing, patch) } else { None };
+                    }
                 }
             }
         }
@@ -180,9 +187,7 @@ impl Band {
     fn visit<S: Simd>(&mut self, simd: S, standing: &Standing, number: u32, drawn: &mut Drawn) {
         let node = &standing.occluder.tree.nodes[number as usize];
         let mut lanes = 0xFFFF >> (16 - node.used);
-        // With a margin all goes jointly, patch by patch.
-        let plain = standing.plain || standing.margin.is_some();
-        if let (Some(loose), false) = (standing.occluder.loose_of_node[number as usize], plain) {
+        if let (Some(loose), false) = (standing.occluder.loose_of_node[number as usize], standing.plain) {
             let loose = &standing.occluder.loose[loose as usize];
             lanes &= !u32::from(loose.lanes);
             let reach_near = simd.vectorize(
@@ -210,7 +215,8 @@ impl Band {
             if node.child[lane] == Slot::EMPTY || extent < standing.least_px || self.rows_of(rect).is_none() {
                 continue;
             }
-            let open = Open { slot: node.child[lane], rect, depth: boxes.depth[lane], clear };
+            let (depth, farthest) = (boxes.depth[lane], boxes.farthest[lane]);
+            let open = Open { slot: node.child[lane], rect, depth, farthest, clear };
             if let Child::Leaf(patch) = open.slot.child()
                 && bodies(standing, &standing.occluder.patches[patch as usize], &open).is_none()
             {
@@ -230,7 +236,7 @@ impl Band {
         drawn: &mut Drawn,
     ) -> u16 {
         let sixteen = &mut self.loose;
-        let sorted = set_up(simd, faces, &standing.at, &standing.sizes, standing.least_px, sixteen);
+        let sorted = set_up(simd, faces, standing, sixteen);
         let mut rest = sorted.draw;
         drawn.patches += u64::from(rest.count_ones());
         drawn.faces += u64::from(rest.count_ones());
@@ -249,13 +255,13 @@ impl Band {
         simd: S,
         standing: &Standing,
         patch: &Patch,
-        open: Open,
+        pass: &Pass,
         bodies: &[Patch],
         drawn: &mut Drawn,
     ) {
-        let Some(placing) = placing_of(standing, &open) else { return };
-        let Open { clear, rect, .. } = open;
-        let plain = standing.plain || standing.margin.is_some() || !clear;
+        let Pass { placing, jointly, .. } = *pass;
+        let Open { clear, rect, .. } = pass.open;
+        let plain = standing.plain || jointly || !clear;
         self.draw_bodies(simd, standing, bodies, &placing, drawn);
         if !bodies.is_empty() {
             return;
@@ -287,11 +293,12 @@ impl Band {
         } else {
             self.clipped_turns(standing, patch, &placing, faces);
         }
-        let Some(margin_px) = self.margin_px(standing) else { return };
+        let margin_px = if jointly { self.margin_px(standing) } else { Some(0) };
+        let Some(margin_px) = margin_px else { return };
         drawn.patches += 1;
         let count = self.turns.iter().filter(|turn| **turn != 0).count();
         drawn.faces += count as u64;
-        if !(clear || standing.plain || standing.margin.is_some()) {
+        if !(clear || standing.plain || jointly) {
             let rect = self.around_clipped(faces, placing.slack, standing.size);
             if is_fine(rect, count, PX_A_CLIPPED_FACE) {
                 if let Some(rect) = self.rows_of(rect) {
@@ -466,8 +473,8 @@ impl Band {
         } else {
             nearest + DEPTH_IS_LESS + depth > 1.0
         };
-        let reach = (metres * pixels / distance).ceil() + 1.0;
-        (!too_near && reach <= 256.0).then_some(reach as i32)
+        let reach = (metres * pixels / distance * 1.000_001).ceil();
+        (!too_near && reach <= MOST_MARGIN_PX).then_some(reach as i32)
     }
 
     /// Places a patch that needs no clipping and says which way its faces turn.
@@ -560,8 +567,8 @@ const PX_A_FACE_OF_A_BOX: i32 = 32;
 fn bodies<'a>(standing: &Standing<'a>, patch: &'a Patch, open: &Open) -> Option<&'a [Patch]> {
     let pixels = area_of(open.rect);
     let wanted = i64::from(patch.faces) * i64::from(standing.px_a_face);
-    // Bodies are drawn whole, beyond the near plane, and for one eye. It is outside of the bounding box, then.
-    let whole = open.clear && !standing.plain && standing.margin.is_none();
+    // Bodies are drawn whole, beyond the near plane of every eye that may come. It is outside of the bounding box, then.
+    let whole = open.clear && !standing.plain && standing.erosion(open.depth).is_some();
     if whole && patch.convex.is_some() && pixels * FACES_OF_A_BODY_FOR_ONE >= wanted {
         return Some(std::slice::from_ref(patch));
     }
@@ -575,21 +582,8 @@ fn bodies<'a>(standing: &Standing<'a>, patch: &'a Patch, open: &Open) -> Option<
     (whole && standing.inner && faces > 0 && worth).then_some(inner)
 }
 
-/// How the vertices of a patch are placed; `None` where f64 could not tell where on the screen they are.
-#[inline(always)]
-fn placing_of(standing: &Standing, open: &Open) -> Option<Placing> {
-    let near = standing.at.d[3];
-    // depth ≥ near / W for all of the patch.
-    let least_w = match standing.at.perspective {
-        true if open.clear => near / f64::from(open.depth),
-        true => near,
-        false => 1.0,
-    };
-    Placing::new(&standing.at, &standing.sizes, least_w)
-}
-
 /// An orthographic depth is kept no more than that below the true one, and a share of it: see [`Placing::depth`].
-const DEPTH_IS_LESS: f64 = 4e-6;
+pub(super) const DEPTH_IS_LESS: f64 = 4e-6;
 
 /// The surface ends at every edge of a face, as far as the face knows.
 const ALL: u32 = 15;

@@ -19,7 +19,7 @@
 //! rule exactly. A pixel's square, widened by the slack, reaches `h = (|A| + |B|)·(128 + slack)` from there.
 
 use super::surface::Surface;
-use super::tile::{Row, TilePlane, blocks_in, tile_plane};
+use super::tile::{Row, TilePlane, blocks_in, blocks_of, tile_plane};
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
 /// A corner on the screen: 1/256 pixel, and a depth that is no larger than the true one.
@@ -137,8 +137,8 @@ impl Joint {
         self.dirty.clear();
     }
 
-    /// As [`Joint::finish`], but a pixel gets the least depth of all within `radius` pixels, and nothing
-    /// where one of these is not covered or not in the image.
+    /// As [`Joint::finish`], but a block of 4×4 pixels gets the least depth of all within `radius` pixels, and nothing
+    /// where one of these is not covered or not in the image: of blocks, that are within a fourth as many of them.
     #[inline(always)]
     pub fn finish_eroded<S: Simd>(&mut self, simd: S, surface: &mut Surface, nearest: f32, radius: i32) {
         let (mut left, mut top, mut right, mut bottom) = (i32::MAX, i32::MAX, 0, 0);
@@ -149,42 +149,49 @@ impl Joint {
         if left >= right {
             return;
         }
-        let width = (right - left) as usize;
-        let mut depths = vec![0.0; width * (bottom - top) as usize];
-        let first_of = |(x, y): (i32, i32)| (y - top) as usize * width + (x - left) as usize;
+        let width = ((right - left) >> 2) as usize;
+        let mut depths = vec![0.0; width * ((bottom - top) >> 2) as usize];
+        let first_of = |(x, y): (i32, i32)| ((y - top) >> 2) as usize * width + ((x - left) >> 2) as usize;
+        let one = i32x16::splat(simd, 1);
         for (joint, &tile) in self.pool.iter().zip(&self.dirty) {
             let at = first_of(surface.corner(tile as usize));
-            for row in 0..16 {
-                for column in 0..16 {
-                    if joint.count[row].0[column] >= 1 {
-                        depths[at + row * width + column] = joint.depth.0[(row & 12) | (column >> 2)];
-                    }
+            for (quarter, rows) in joint.count.as_chunks::<4>().0.iter().enumerate() {
+                let mut covered = 0xFFFF;
+                for row in rows {
+                    covered &= i32x16::from_slice(simd, &row.0).simd_ge(one).to_bitmask() as u32;
+                }
+                let whole = blocks_of(covered);
+                for block in (0..4).filter(|block| whole >> block & 1 == 1) {
+                    depths[at + quarter * width + block] = joint.depth.0[quarter * 4 + block];
                 }
             }
         }
+        let radius = (radius as usize).div_ceil(4);
         for row in depths.chunks_exact_mut(width) {
             let mut values = row.to_vec();
-            erode(&mut values, 1, radius as usize);
+            erode(&mut values, 1, radius);
             row.copy_from_slice(&values);
         }
-        erode(&mut depths, width, radius as usize);
+        erode(&mut depths, width, radius);
         for (joint, &tile) in self.pool.iter_mut().zip(&self.dirty) {
             let at = first_of(surface.corner(tile as usize));
             *joint = JointTile::EMPTY;
             let tile = tile as usize;
             self.place[tile] = NO_ROOM;
-            surface.open(simd, tile);
-            for row in 0..16 {
-                let depth = f32x16::from_slice(simd, &depths[at + row * width..][..16]);
-                surface.raise(simd, tile, row as i32, depth, mask32x16::from_bitmask(simd, 0xFFFF));
+            let mut floors = [0.0; 16];
+            for (quarter, four) in floors.chunks_exact_mut(4).enumerate() {
+                four.copy_from_slice(&depths[at + quarter * width..][..4]);
             }
-            surface.raised(tile, nearest);
+            let floors = f32x16::from_slice(simd, &floors);
+            let covered = floors.simd_gt(0.0).to_bitmask() as u32;
+            surface.raise_blocks(simd, tile, covered, floors, nearest);
         }
         self.dirty.clear();
     }
 }
 
 /// Least values over windows of 2·radius + 1 elements, each `width` wide; beyond both ends is 0.
+#[inline(always)]
 fn erode(values: &mut Vec<f32>, width: usize, radius: usize) {
     let padding = vec![0.0; radius * width];
     let count = values.len();

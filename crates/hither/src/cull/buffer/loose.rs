@@ -14,8 +14,9 @@
 //! *Bound.* Bounds are taken in f32. p, y and their difference have at most 24 bits and are exact; each of the
 //! six roundings is at most 2⁻²⁴ of the terms' magnitudes. Each bound is moved inwards by 2⁻²⁰ of them.
 
+use super::draw::Standing;
 use super::occluder::{Face, Patch, Vertices};
-use super::place::{Placing, ROUND, Sizes, dot};
+use super::place::{Placing, ROUND, dot};
 use super::surface::Surface;
 use super::tile::{COLUMNS, tile_plane};
 use crate::index::{Child, Slot, WideTree};
@@ -143,16 +144,11 @@ struct Eight<S: Simd> {
     d: [f64x8<S>; 4],
 }
 
-/// Sets up the loose faces of a node; those that touch fewer than `least_px` + 1 columns or rows are left out.
+/// Sets up the loose faces of a node; those that touch fewer columns or rows than are worth it, and one more, are left
+/// out. With a margin all are eroded by what moves the nearest.
 #[inline(always)]
-pub(super) fn set_up<S: Simd>(
-    simd: S,
-    faces: &LooseFaces,
-    at: &ScreenFromObject,
-    sizes: &Sizes,
-    least_px: i32,
-    out: &mut Sixteen,
-) -> Sorted {
+pub(super) fn set_up<S: Simd>(simd: S, faces: &LooseFaces, standing: &Standing, out: &mut Sixteen) -> Sorted {
+    let (at, least_px) = (&standing.at, standing.least_px);
     let mut halves = widen(simd, faces, at);
     let (clip_low, least_low) = divide(simd, &mut halves[0], at);
     let (clip_high, least_high) = divide(simd, &mut halves[1], at);
@@ -166,7 +162,14 @@ pub(super) fn set_up<S: Simd>(
         sorted.draw = 0;
         return sorted;
     }
-    let Some(placing) = Placing::new(at, sizes, least_w) else { return Sorted::default() };
+    let Some(mut placing) = Placing::new(at, &standing.sizes, least_w) else { return Sorted::default() };
+    if standing.margin.is_some() {
+        match standing.erosion_from(least_w) {
+            Some(erosion) if at.perspective => placing.slack += erosion,
+            // They are patches like others.
+            _ => return Sorted { draw: 0, clip: faces.lanes },
+        }
+    }
     for half in &mut halves {
         snap(simd, half, &placing);
     }

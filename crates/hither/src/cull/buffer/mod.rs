@@ -66,21 +66,30 @@
 //!
 //! Asked with [`Meaning::Sampled`], the extent of a box are only the pixels whose centres it may hold, moved by no
 //! more than 1/256 pixel as a rasteriser snaps corners. What a pixel holds is true of its whole square, hence of
-//! its centre; and there, by the fill rule on snapped corners, at least one face of the patch is drawn.
+//! its centre; and there, by the fill rule on snapped corners, at least one face of the patch is drawn. So it is where a
+//! box inside of a closed patch covers the square: the square, at the depth that is kept, lies inside of the patch, whose
+//! surface snapping moves across the image by less than the half pixel from there to the centre. The centre at that
+//! depth stays inside, and the surface before it.
 //!
 //! # A moving eye
 //!
 //! With a margin of r metres a patch is eroded by ρ pixels, and each pixel takes the least depth within ρ, where
-//! ρ bounds how far on the image a displacement of r can move a point no nearer than the patch. Let e be the
+//! ρ bounds how far on the image a displacement of r can move a point no nearer than the patch. As far as the numbers
+//! allow, that is a slack of δ + ρ instead of δ in all that is said above of squares and faces. Let e be the
 //! eye of the buffer, e' within r of it, b hidden. A point x' of the segment e'b is within r of the point x of eb
 //! that divides it alike, and x lies on b's ray. As long as x' is no nearer than the nearest point of the patch,
 //! it is within ρ pixels of b on e's image, where the patch covers everything at least once and lies wholly
 //! before b. Going from b towards e', x' begins behind the patch and ends before it, and all the while stays
 //! where N ≥ 1: it crosses the patch. Motion of an occluder by m adds m to r; boxes are widened by 2m.
 //!
-//! The near plane, and an orthographic view's far one, go with the eye. A patch of which some is within r of the near
-//! plane is not drawn, for e' may have that behind it; what lies before the near plane or beyond the far one is outside
-//! only if it does so by more than r.
+//! The near plane, and an orthographic view's far one, go with the eye. What of a patch is within r of the near plane
+//! does not count, for e' may have that behind it; what lies before the near plane or beyond the far one is outside only
+//! if it does so by more than r. In perspective a patch is cut there by a plane across the view: what lies beyond is a
+//! surface of its own that ends at the cut, the same for e and e'. So is what lies beyond any other such plane, and as
+//! its nearest point is farther away, its ρ is less: a surface that goes far is drawn several times (`pass`).
+//!
+//! Of something that the image's border cuts, e' may see some that e does not: by no more than ρ, now of what is asked
+//! about. A buffer that has a border of its own around the image answers for that, where ρ is less than the border.
 
 mod ask;
 mod clip;
@@ -93,6 +102,7 @@ mod loose;
 mod mosaic;
 mod occludee;
 mod occluder;
+mod pass;
 mod place;
 mod queries;
 mod sampled;
@@ -257,6 +267,8 @@ pub(super) struct Frame {
     moves: f64,
     /// Pixels that a metre at distance 1 covers anywhere in the image.
     pixels_a_metre: f64,
+    /// Pixels on each side that are not of the image: what an eye that comes may see there is drawn, too.
+    border: u32,
 }
 
 impl Frame {
@@ -275,6 +287,7 @@ impl Frame {
             screen_from_world,
             moves: (options.eye_moves + options.objects_move) * view.stretch(),
             pixels_a_metre,
+            border: 0,
         })
     }
 
@@ -291,8 +304,11 @@ impl Frame {
     /// bottom the last may reach beyond the view. So this shows all that the view shows, and what it calls hidden or
     /// outside is so in the view: nothing that is promised depends on the size of pixels. Boxes may be asked about,
     /// and nothing else: `view` keeps the projection of the whole.
+    ///
+    /// With a margin it also gets a border of [`BORDER`] such pixels on each side.
     pub(in crate::cull) fn coarser(mut self, n: u32) -> Result<Frame, ViewError> {
-        if n == 1 {
+        let border = if self.margin().is_some() { BORDER } else { 0 };
+        if n == 1 && border == 0 {
             return Ok(self);
         }
         if n == 0 {
@@ -303,12 +319,16 @@ impl Frame {
         if self.meaning == Meaning::Sampled {
             return Err(ViewError::Camera("what is sampled needs the view's own pixels, not coarser ones"));
         }
-        self.pixels_a_metre = pixels_a_metre(&self.view, n - 1) / f64::from(n);
+        let beyond = border.saturating_mul(n);
+        self.pixels_a_metre = pixels_a_metre(&self.view, beyond.saturating_add(n - 1)) / f64::from(n);
+        self.screen_from_world = ScreenFromObject::of_view_with_border(&self.view, beyond);
         // Rounded once more where n is no power of two: 2⁻⁵³ of each term, as any matrix on the way here.
         for row in [&mut self.screen_from_world.x, &mut self.screen_from_world.y] {
             *row = row.map(|c| c / f64::from(n));
         }
-        (self.view.width, self.view.height) = (self.view.width.div_ceil(n), self.view.height.div_ceil(n));
+        let size = |side: u32| side.div_ceil(n) + 2 * border;
+        (self.view.width, self.view.height) = (size(self.view.width), size(self.view.height));
+        self.border = border;
         Ok(self)
     }
 
@@ -341,11 +361,15 @@ impl Frame {
             size: [self.view.width as i32, self.view.height as i32],
             least_px,
             px_a_face: 0,
-            inner: self.meaning == Meaning::Continuous,
+            inner: true,
             plain: false,
         }
     }
 }
+
+/// Pixels on each side of an image with a margin. What is cut by the image's border and so far away that it moves by no
+/// more can be hidden.
+const BORDER: u32 = 32;
 
 /// Pixels that a metre at distance 1 covers anywhere in an image that goes on for `beyond` pixels at the right and at
 /// the bottom.

@@ -120,7 +120,7 @@ impl Area {
 const MOST_EDGES: usize = 10_000;
 
 /// A face that touches no more pixels each way has its farthest corner for a plane: it is as good a bound.
-const FEW_PX: i32 = 4;
+const FEW_PX: i32 = 3;
 
 /// The plane below a face, given its corners as they are placed.
 #[inline(always)]

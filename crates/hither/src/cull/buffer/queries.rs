@@ -219,6 +219,7 @@ impl Frame {
         if let Some(Margin { metres, pixels, depth }) = self.margin() {
             view.margin = [(metres as f32).next_up(), (pixels as f32).next_up()];
             view.depth_margin = (depth as f32).next_up();
+            view.border = self.border as f32;
         }
         view
     }

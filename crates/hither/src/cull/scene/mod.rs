@@ -85,7 +85,7 @@ impl Default for CullOptions {
             objects_move: 0.0,
             meaning: Meaning::Continuous,
             coarseness: 1,
-            least_occluder_px: 400,
+            least_occluder_px: 800,
             least_piece_px: 6,
             least_px_a_face: 64,
             boxes_an_instance: 256,

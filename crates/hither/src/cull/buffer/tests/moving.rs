@@ -86,6 +86,94 @@ fn sees(view: &View, eye: DVec3, point: DVec3, square: Option<(DVec3, f64)>) -> 
     in_view && !hidden
 }
 
+/// A floor of few or many faces that goes on below the eye and behind it, and some large walls.
+fn floors(seed: u64) -> (Scene, View) {
+    let random = &mut Random::new(seed);
+    let mut scene = Scene::new("floors");
+    scene.materials = vec![Material { double_sided: true, ..Material::default() }];
+    for k in 0..1 + random.below(6) {
+        let faces = [1, 2, 9][random.below(3) as usize];
+        let place = |i: u32| i as f32 / faces as f32 - 0.5;
+        let corners = (0..=faces).flat_map(|z| (0..=faces).map(move |x| Vec3::new(place(x), 0.0, place(z))));
+        let at = |x: u32, z: u32| z * (faces + 1) + x;
+        let square =
+            |x, z| [[at(x, z), at(x, z + 1), at(x + 1, z)], [at(x + 1, z), at(x, z + 1), at(x + 1, z + 1)]];
+        let triangles: Vec<_> = (0..faces).flat_map(|z| (0..faces).flat_map(move |x| square(x, z))).collect();
+        let primitives = vec![Primitive { triangles: 0..triangles.len() as u32, material: Some(0) }];
+        let positions = corners.collect();
+        scene.meshes.push(Mesh { positions, triangles, primitives, ..Mesh::default() });
+        let (middle, size, turn) = match k {
+            0 => (DVec3::ZERO, 80.0, DQuat::IDENTITY),
+            _ => (
+                DVec3::new(random.between(-6.0, 6.0), 0.0, random.between(-6.0, 6.0)),
+                random.between(1.0, 12.0),
+                DQuat::from_rotation_y(random.between(0.0, 6.3)) * DQuat::from_rotation_x(1.57),
+            ),
+        };
+        let local = Transform::Trs { translation: middle, rotation: turn, scale: DVec3::splat(size) };
+        scene.groups[0].push(Node { content: Content::Mesh(k), local, ..Node::default() });
+    }
+    let eye = DVec3::new(random.between(-1.0, 1.0), random.between(0.1, 2.0), random.between(-1.0, 1.0));
+    let target =
+        eye + DVec3::new(random.between(-1.0, 1.0), random.between(-0.4, 0.1), random.between(-1.0, 1.0));
+    let near = [0.01, 0.1, 0.5][random.below(3) as usize];
+    let projection = Projection::Perspective { fov_y: random.between(0.3, 2.0), near };
+    (
+        scene,
+        View::look_at(eye, target, DVec3::Y, projection, (60 + random.below(240), 60 + random.below(140))),
+    )
+}
+
+fn asked(buffer: &OcclusionBuffer, b: &Aabb) -> bool {
+    buffer.ask_box(b) == Verdict::Hidden
+}
+
+#[test]
+fn whatever_was_drawn_a_moved_eye_sees_nothing_that_it_hides() {
+    let counts = (0..1500u64).into_par_iter().map(|seed| {
+        let random = &mut Random::new(seed + 90);
+        let (scene, view) = match seed % 5 {
+            0 => rubble(seed),
+            1 => bodies(seed),
+            2 => (lumps(seed), around(random, 4.0, (80, 60))),
+            _ => floors(seed),
+        };
+        let r = [1e-6, 0.003, 0.02, 0.1, 0.4][random.below(5) as usize];
+        let options = OcclusionOptions { eye_moves: r, ..OcclusionOptions::default() };
+        let buffer = drawn(&scene, &view, &options);
+        let reach = [4.0, 30.0][random.below(2) as usize];
+        let bounds: Vec<Aabb> = (0..120)
+            .map(|_| {
+                let (at, half) = (random.point(reach), [0.0, 0.02, 0.3][random.below(3) as usize]);
+                cube_at(at * DVec3::new(1.0, 0.2, 1.0), half)
+            })
+            .collect();
+        let mut hidden: Vec<Aabb> = bounds.iter().copied().filter(|b| asked(&buffer, b)).collect();
+        // Those that are only just hidden: between one that is and one that is not.
+        for _ in 0..hidden.len().min(40) {
+            let mut between =
+                [hidden[random.below(hidden.len() as u32) as usize], bounds[random.below(120) as usize]];
+            for _ in 0..14 {
+                let [a, b] = between;
+                let middle = Aabb { min: (a.min + b.min) * 0.5, max: (a.max + b.max) * 0.5 };
+                between[usize::from(!asked(&buffer, &middle))] = middle;
+            }
+            hidden.push(between[0]);
+        }
+        for _ in 0..8 {
+            let mut moved = view;
+            moved.view_from_world = DAffine3::from_translation(step(random, r)) * view.view_from_world;
+            let sight = Sight::new(&scene, &moved);
+            for b in &hidden {
+                points_are_out_of_sight(&sight, &moved, b, Verdict::Hidden, random, seed);
+            }
+        }
+        [usize::from(seed % 5 < 3) * hidden.len(), usize::from(seed % 5 >= 3) * hidden.len()]
+    });
+    let [small, large] = counts.reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    assert!(small > 2000 && large > 8000, "{small} behind what is small, {large} behind what is large");
+}
+
 #[test]
 fn what_lies_about_the_near_and_the_far_plane_is_asked_about_for_every_eye() {
     let random = &mut Random::new(67);
