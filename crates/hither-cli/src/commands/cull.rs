@@ -1,8 +1,9 @@
 //! `hither cull`: which instances could be seen.
 
+mod exact;
 mod planes;
 
-use super::report::{self, Seen};
+use super::report;
 use crate::console::{self, Verbosity};
 use crate::eye::Eye;
 use crate::failure::Failure;
@@ -15,7 +16,7 @@ use crate::timeline::Timeline;
 use clap::ValueEnum;
 use hither::conventions::View;
 use hither::cull::{CullCounters, CullOptions, Culler, Meaning, Reason};
-use hither::{IndexOptions, RenderOptions, Renderer, SceneIndex};
+use hither::{IndexOptions, SceneIndex};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -61,7 +62,7 @@ enum MethodName {
     Buffer,
     /// Planes through the eye and the sides of large polygons, no image: what is left out cannot be seen
     Planes,
-    /// What is nearest at some pixel centre: what is left out may be seen between centres
+    /// What shows at some pixel centre: what is left out may be seen between centres
     Exact,
 }
 
@@ -156,14 +157,14 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
 /// A method with what it keeps from frame to frame.
 enum Method {
     Buffer(Box<Culler>, CullOptions),
-    Exact(Box<Renderer>),
+    Exact(Box<exact::Exact>),
     Planes(Box<planes::Planes>),
 }
 
 impl Method {
     fn new(arguments: &Arguments, index: &SceneIndex) -> Method {
         match arguments.method {
-            MethodName::Exact => Method::Exact(Box::default()),
+            MethodName::Exact => Method::Exact(Box::new(exact::Exact::new(index))),
             MethodName::Planes => Method::Planes(Box::new(planes::Planes::new(arguments, index))),
             MethodName::Buffer => {
                 let mut culler = Box::new(Culler::new());
@@ -198,16 +199,7 @@ impl Method {
                 Ok(Found { visible: found.visible, reasons, polygons: None, counters, time })
             }
             Method::Planes(planes) => planes.find(index, view),
-            Method::Exact(renderer) => {
-                let frame = renderer
-                    .render(index, view, &RenderOptions::default())
-                    .map_err(|e| Failure::work(e.to_string()))?;
-                let time = start.elapsed();
-                let visible = Seen::instances_of(&frame);
-                let counters = report::counters(&frame.counters);
-                renderer.recycle(frame);
-                Ok(Found { visible, reasons: None, polygons: None, counters, time })
-            }
+            Method::Exact(exact) => exact.find(index, view),
         }
     }
 }
