@@ -34,7 +34,7 @@ pub enum Shading {
     /// Base colour, lit on interpolated normals where the mesh has them.
     #[default]
     Smooth,
-    /// A colour for each instance.
+    /// A colour for each instance, a little lighter or darker from triangle to triangle.
     Ids,
     /// Distance as grey, near white, over the range that the frame shows.
     Depth,
