@@ -114,3 +114,32 @@ fn glass_that_tints_is_seen_by_every_method_and_holes_are_seen_through() {
         assert!(!found.contains(&"behind".to_owned()), "{method}: {found:?}");
     }
 }
+
+#[test]
+fn a_report_says_all_that_the_answer_and_its_time_depend_on() {
+    let cores = std::thread::available_parallelism().unwrap().get();
+    let of = |more: &[&str]| {
+        let report = report(&[&["cull", "world:tetra", "--size", "64x48"], more].concat());
+        let settings = ["margin", "coarse", "coherence", "around", "occluders", "leaf", "paper", "threads"];
+        let all: Vec<Value> = settings.iter().map(|name| report.get(*name).expect(name).clone()).collect();
+        Value::from(all)
+    };
+    assert_eq!(of(&["--coherence", "--coarse", "2"]), json!([0.0, 2, true, null, null, null, null, 1]));
+    assert_eq!(of(&["--method", "exact"]), json!([0.0, 1, false, null, null, null, null, 1]));
+    let planes = |more: &[&str]| of(&[&["--method", "planes"], more].concat());
+    assert_eq!(planes(&[]), json!([0.0, 1, false, false, "auto", "auto", false, 1]));
+    let chosen = ["--around", "--occluders", "12", "--leaf", "6", "--threads", "2"];
+    assert_eq!(planes(&chosen), json!([0.0, 1, false, true, 12, 6, false, 2]));
+    let paper = ["--paper", "--margin", "0.5", "--threads", "0"];
+    assert_eq!(planes(&paper), json!([0.5, 1, false, true, 32, 8, true, cores]));
+    for command in ["render", "lines"] {
+        let threads = |n: &str| {
+            let folder = Folder::new(&format!("threads-{command}-{n}"));
+            let drawing = folder.0.join(if command == "lines" { "x.svg" } else { "x.png" });
+            let drawing = drawing.display().to_string();
+            let arguments = [command, "world:lecture", "--size", "64x48", "--threads", n, "-o", &drawing];
+            report(&arguments)["threads"].clone()
+        };
+        assert_eq!([threads("0"), threads("3")], [json!(cores), json!(3)], "{command}");
+    }
+}

@@ -122,6 +122,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     bar.finish_and_clear();
     let mut json = report::opening("cull");
     json.extend(settings(arguments, &eye, &index));
+    json.extend(method.settings());
     json.insert("frames".into(), frames.into());
     outputs::write_report(to, &json.into())
 }
@@ -181,6 +182,17 @@ impl Method {
                 Method::Buffer(culler, options)
             }
         }
+    }
+
+    /// What the report says of method planes alone, null for the others, and of threads.
+    fn settings(&self) -> Map<String, Value> {
+        let settings = match self {
+            Method::Planes(planes) => planes.settings(),
+            Method::Buffer(..) | Method::Exact(_) => json!({
+                "around": null, "occluders": null, "leaf": null, "paper": null, "threads": 1,
+            }),
+        };
+        settings.as_object().cloned().unwrap_or_default()
     }
 
     fn find(&mut self, index: &SceneIndex, view: &View) -> Result<Found, Failure> {
@@ -266,6 +278,7 @@ fn settings(arguments: &Arguments, eye: &Eye, index: &SceneIndex) -> Map<String,
     map.insert("objects_move".into(), arguments.objects_move.into());
     map.insert("sampled".into(), arguments.sampled.into());
     map.insert("coarse".into(), arguments.coarse.into());
+    map.insert("coherence".into(), arguments.coherence.into());
     map
 }
 
