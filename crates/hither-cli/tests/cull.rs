@@ -143,3 +143,33 @@ fn a_report_says_all_that_the_answer_and_its_time_depend_on() {
         assert_eq!([threads("0"), threads("3")], [json!(cores), json!(3)], "{command}");
     }
 }
+
+#[test]
+fn verbose_lists_counters_and_what_could_be_seen_nearest_first() {
+    let folder = Folder::new("verbose");
+    let arguments = panes(&folder);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    for method in ["buffer", "exact", "planes"] {
+        let told = |more: &[&str]| done(&[&arguments, &["--method", method][..], more].concat());
+        let report: Value = serde_json::from_slice(&told(&["--json", "-"]).stdout).unwrap();
+        let frame = &report["frames"][0];
+        let seen = frame["visible"].as_array().unwrap();
+        let listed = seen.iter().map(|v| format!("  {} {}", v["instance"], v["name"].as_str().unwrap()));
+        let listed: Vec<String> = listed.collect();
+        let lines = |bytes: &[u8]| -> Vec<String> {
+            String::from_utf8(bytes.to_vec()).unwrap().lines().map(str::to_owned).collect()
+        };
+        assert_eq!(lines(&told(&[]).stdout).len(), 1, "{method}");
+        let verbose = lines(&told(&["-v"]).stdout);
+        assert!(verbose[0].contains(&format!("{} of 8 instances could be seen", seen.len())), "{verbose:?}");
+        let counters = verbose[1].replace(',', "");
+        for (counter, number) in frame["counters"].as_object().unwrap() {
+            let words = format!("{number} {}", counter.replace('_', " "));
+            assert!(number.is_null() || counters.contains(&words), "{counter}: {verbose:?}");
+        }
+        assert_eq!(verbose[2..], listed, "{method}");
+        // Where the report has standard output, all of it is a detail on standard error.
+        let errors = lines(&told(&["-v", "--json", "-"]).stderr);
+        assert!(errors.ends_with(&listed), "{errors:?}");
+    }
+}

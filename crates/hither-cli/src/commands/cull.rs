@@ -16,7 +16,8 @@ use crate::timeline::Timeline;
 use clap::ValueEnum;
 use hither::conventions::View;
 use hither::cull::{CullCounters, CullOptions, Culler, Meaning, Reason};
-use hither::{IndexOptions, SceneIndex};
+use hither::{IndexOptions, Scene, SceneIndex};
+use hither_io::one_line;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -230,22 +231,39 @@ fn say(
     if let Some(polygons) = &found.polygons {
         line += &format!("; {}", polygons.line());
     }
+    let mut lines = vec![line];
+    if verbosity == Verbosity::Verbose {
+        lines.push(format!("  {}", counters_line(&found.counters)));
+        let named = |&i: &u32| format!("  {i} {}", one_line(&name(index.scene(), i).unwrap_or_default()));
+        lines.extend(found.visible.iter().map(named));
+    }
     match to {
-        None if verbosity != Verbosity::Quiet => console::print(&format!("{line}\n")),
+        None if verbosity != Verbosity::Quiet => console::print(&format!("{}\n", lines.join("\n"))),
         None => Ok(()),
         Some(_) => {
-            verbosity.detail(&line);
+            lines.iter().for_each(|line| verbosity.detail(line));
             Ok(())
         }
     }
 }
 
+/// Counters as the report names them, without those that were not recorded.
+fn counters_line(counters: &Value) -> String {
+    let all = counters.as_object().into_iter().flatten();
+    let one = |(name, value): (&String, &Value)| {
+        value.as_u64().map(|number| format!("{} {}", grouped(number), name.replace('_', " ")))
+    };
+    all.filter_map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// The names of nodes that lead to an instance.
+fn name(scene: &Scene, instance: u32) -> Option<String> {
+    scene.instance(instance.into()).map(|instance| scene.path_name(&instance.path))
+}
+
 fn frame_json(index: &SceneIndex, found: &Found, number: u32, time: Option<f64>, view: &View) -> Value {
     let scene = index.scene();
-    let named = |&i: &u32| {
-        let name = scene.instance(u64::from(i)).map(|instance| scene.path_name(&instance.path));
-        json!({ "instance": i, "name": name })
-    };
+    let named = |&i: &u32| json!({ "instance": i, "name": name(scene, i) });
     let mut frame = json!({
         "frame": number,
         "scene_time_ms": time.map(|t| t * 1e3),
