@@ -195,7 +195,7 @@ pub enum ShadeName {
     Flat,
     /// Colour and a headlight on interpolated normals
     Smooth,
-    /// A colour for each instance
+    /// A colour for each instance, a little lighter or darker from triangle to triangle
     Ids,
     /// Distance as grey
     Depth,
@@ -231,6 +231,14 @@ impl ShadeName {
             ShadeName::ComplexityPolygons => Some(ComplexityPanel::Polygons),
             _ => None,
         }
+    }
+}
+
+/// How many threads `--threads` asks for.
+pub fn threads(number: u16) -> usize {
+    match number {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        n => n.into(),
     }
 }
 

@@ -378,6 +378,7 @@ fn names_out_of_files_and_of_files_act_on_no_terminal() {
         (&["info", &folder.path(&format!("no {NAME}"))], 1),
         (&["info", &names, "--no-such", NAME], 1),
         (&["order", &names, eye[0], eye[1]], 2),
+        (&["cull", &names, "-v", eye[0], eye[1]], 2),
         (&["render", &names, "-o", &picture, "--camera", NAME], 1),
         (&["render", &names, "-o", &picture, "--camera", "x"], 1),
         (&["render", &names, "-o", &picture, "--animation", NAME, "--camera", "two"], 1),

@@ -1,8 +1,9 @@
 //! `hither cull`: which instances could be seen.
 
+mod exact;
 mod planes;
 
-use super::report::{self, Seen};
+use super::report;
 use crate::console::{self, Verbosity};
 use crate::eye::Eye;
 use crate::failure::Failure;
@@ -15,7 +16,8 @@ use crate::timeline::Timeline;
 use clap::ValueEnum;
 use hither::conventions::View;
 use hither::cull::{CullCounters, CullOptions, Culler, Meaning, Reason};
-use hither::{IndexOptions, RenderOptions, Renderer, SceneIndex};
+use hither::{IndexOptions, Scene, SceneIndex};
+use hither_io::one_line;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -61,7 +63,7 @@ enum MethodName {
     Buffer,
     /// Planes through the eye and the sides of large polygons, no image: what is left out cannot be seen
     Planes,
-    /// What is nearest at some pixel centre: what is left out may be seen between centres
+    /// What shows at some pixel centre: what is left out may be seen between centres
     Exact,
 }
 
@@ -121,6 +123,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     bar.finish_and_clear();
     let mut json = report::opening("cull");
     json.extend(settings(arguments, &eye, &index));
+    json.extend(method.settings());
     json.insert("frames".into(), frames.into());
     outputs::write_report(to, &json.into())
 }
@@ -156,14 +159,14 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
 /// A method with what it keeps from frame to frame.
 enum Method {
     Buffer(Box<Culler>, CullOptions),
-    Exact(Box<Renderer>),
+    Exact(Box<exact::Exact>),
     Planes(Box<planes::Planes>),
 }
 
 impl Method {
     fn new(arguments: &Arguments, index: &SceneIndex) -> Method {
         match arguments.method {
-            MethodName::Exact => Method::Exact(Box::default()),
+            MethodName::Exact => Method::Exact(Box::new(exact::Exact::new(index))),
             MethodName::Planes => Method::Planes(Box::new(planes::Planes::new(arguments, index))),
             MethodName::Buffer => {
                 let mut culler = Box::new(Culler::new());
@@ -182,6 +185,17 @@ impl Method {
         }
     }
 
+    /// What the report says of method planes alone, null for the others, and of threads.
+    fn settings(&self) -> Map<String, Value> {
+        let settings = match self {
+            Method::Planes(planes) => planes.settings(),
+            Method::Buffer(..) | Method::Exact(_) => json!({
+                "around": null, "occluders": null, "leaf": null, "paper": null, "threads": 1,
+            }),
+        };
+        settings.as_object().cloned().unwrap_or_default()
+    }
+
     fn find(&mut self, index: &SceneIndex, view: &View) -> Result<Found, Failure> {
         let start = Instant::now();
         match self {
@@ -198,16 +212,7 @@ impl Method {
                 Ok(Found { visible: found.visible, reasons, polygons: None, counters, time })
             }
             Method::Planes(planes) => planes.find(index, view),
-            Method::Exact(renderer) => {
-                let frame = renderer
-                    .render(index, view, &RenderOptions::default())
-                    .map_err(|e| Failure::work(e.to_string()))?;
-                let time = start.elapsed();
-                let visible = Seen::instances_of(&frame);
-                let counters = report::counters(&frame.counters);
-                renderer.recycle(frame);
-                Ok(Found { visible, reasons: None, polygons: None, counters, time })
-            }
+            Method::Exact(exact) => exact.find(index, view),
         }
     }
 }
@@ -226,22 +231,39 @@ fn say(
     if let Some(polygons) = &found.polygons {
         line += &format!("; {}", polygons.line());
     }
+    let mut lines = vec![line];
+    if verbosity == Verbosity::Verbose {
+        lines.push(format!("  {}", counters_line(&found.counters)));
+        let named = |&i: &u32| format!("  {i} {}", one_line(&name(index.scene(), i).unwrap_or_default()));
+        lines.extend(found.visible.iter().map(named));
+    }
     match to {
-        None if verbosity != Verbosity::Quiet => console::print(&format!("{line}\n")),
+        None if verbosity != Verbosity::Quiet => console::print(&format!("{}\n", lines.join("\n"))),
         None => Ok(()),
         Some(_) => {
-            verbosity.detail(&line);
+            lines.iter().for_each(|line| verbosity.detail(line));
             Ok(())
         }
     }
 }
 
+/// Counters as the report names them, without those that were not recorded.
+fn counters_line(counters: &Value) -> String {
+    let all = counters.as_object().into_iter().flatten();
+    let one = |(name, value): (&String, &Value)| {
+        value.as_u64().map(|number| format!("{} {}", grouped(number), name.replace('_', " ")))
+    };
+    all.filter_map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// The names of nodes that lead to an instance.
+fn name(scene: &Scene, instance: u32) -> Option<String> {
+    scene.instance(instance.into()).map(|instance| scene.path_name(&instance.path))
+}
+
 fn frame_json(index: &SceneIndex, found: &Found, number: u32, time: Option<f64>, view: &View) -> Value {
     let scene = index.scene();
-    let named = |&i: &u32| {
-        let name = scene.instance(u64::from(i)).map(|instance| scene.path_name(&instance.path));
-        json!({ "instance": i, "name": name })
-    };
+    let named = |&i: &u32| json!({ "instance": i, "name": name(scene, i) });
     let mut frame = json!({
         "frame": number,
         "scene_time_ms": time.map(|t| t * 1e3),
@@ -274,6 +296,7 @@ fn settings(arguments: &Arguments, eye: &Eye, index: &SceneIndex) -> Map<String,
     map.insert("objects_move".into(), arguments.objects_move.into());
     map.insert("sampled".into(), arguments.sampled.into());
     map.insert("coarse".into(), arguments.coarse.into());
+    map.insert("coherence".into(), arguments.coherence.into());
     map
 }
 

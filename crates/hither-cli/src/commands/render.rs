@@ -185,7 +185,7 @@ impl Job<'_> {
             "box_test": options::word(arguments.work.box_test),
             "tree": options::word(arguments.work.tree),
             "shade": options::word(arguments.shade),
-            "threads": arguments.work.threads,
+            "threads": options::threads(arguments.work.threads),
             "coherence": arguments.work.coherence,
         });
         match settings {

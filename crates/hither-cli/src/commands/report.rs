@@ -58,23 +58,6 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// Numbers of the instances that are nearest at some pixel centre, in the order of their nearest such depth.
-    pub fn instances_of(frame: &Frame) -> Vec<u32> {
-        let mut nearest = std::collections::HashMap::new();
-        for y in 0..frame.view.height {
-            for x in 0..frame.view.width {
-                if let Some(id) = frame.id(x, y) {
-                    let depth = frame.depth(x, y);
-                    let known = nearest.entry(id.instance).or_insert(depth);
-                    *known = depth.max(*known);
-                }
-            }
-        }
-        let mut instances: Vec<(u32, f32)> = nearest.into_iter().collect();
-        instances.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        instances.into_iter().map(|(instance, _)| instance).collect()
-    }
-
     /// Counts the surfaces that are nearest at some pixel centre.
     pub fn count(frame: &Frame) -> Seen {
         let (mut instances, mut triangles) = (HashSet::new(), HashSet::new());

@@ -4,6 +4,7 @@
 
 use serde::de::{Error, IgnoredAny, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer};
+use serde_path_to_error::{Path, Segment};
 use std::collections::BTreeMap;
 
 /// A non-negative integer. Some exporters write `3.0`; that is 3.
@@ -381,10 +382,28 @@ pub(super) fn parse(text: &[u8]) -> Result<Document, String> {
         let again: Result<Document, _> =
             serde_path_to_error::deserialize(&mut serde_json::Deserializer::from_slice(text));
         match again {
-            Err(e) if e.path().iter().next().is_some() => format!("{}: {}", e.path(), e.inner()),
-            _ => plain.to_string(),
+            Err(e) => match known(e.path()) {
+                path if path.is_empty() => plain.to_string(),
+                path => format!("{path}: {}", e.inner()),
+            },
+            Ok(_) => plain.to_string(),
         }
     })
+}
+
+/// A path without the `?` at its end that stands for a member whose name was not read.
+fn known(path: &Path) -> String {
+    let text = path.to_string();
+    let known = match path.iter().next_back() {
+        // It is written as a point.
+        None => "",
+        Some(Segment::Unknown) => {
+            let parent = text.strip_suffix('?').unwrap_or(&text);
+            parent.strip_suffix('.').unwrap_or(parent)
+        }
+        Some(_) => &text,
+    };
+    known.to_owned()
 }
 
 #[cfg(test)]
@@ -410,6 +429,17 @@ mod tests {
         let text = br#"{"accessors":[{"componentType":5126,"type":"VEC3"}]}"#;
         let message = parse(text).unwrap_err();
         assert!(message.starts_with("accessors[0]: missing field `count`"), "{message}");
+        for (text, place) in [
+            (r#"{"asset":{"version":"2.0"},"nodes":[{"name":"a""#, "nodes[0]: EOF while parsing"),
+            (r#"{"asset":{"version":"2.0""#, "asset: EOF while parsing"),
+            (r#"{"asset":{"version":"2.0"}"#, "EOF while parsing"),
+            ("{", "EOF while parsing"),
+            ("{3:4}", "key must be a string"),
+            ("3", "invalid type"),
+        ] {
+            let message = parse(text.as_bytes()).unwrap_err();
+            assert!(message.starts_with(place), "{text}: {message}");
+        }
     }
 
     #[test]

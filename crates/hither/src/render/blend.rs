@@ -92,22 +92,12 @@ pub(super) fn composite(
     locator: &InstanceLocator,
     fragments: &(impl Fn(Range<u32>) -> Vec<Fragment> + Sync),
 ) {
-    let view = &frame.view;
-    let width = view.width as usize;
-    let rows = (BAND_PIXELS / width).max(1);
+    let width = frame.view.width as usize;
+    let rows = rows_of_a_band(&frame.view) as usize;
     image.pixels.par_chunks_mut(rows * width).enumerate().for_each(|(band, pixels)| {
         let first = band * rows;
-        let mut found = fragments(first as u32..(first + pixels.len() / width) as u32);
-        found.retain(|f| f.may_be_before(frame));
-        let ids = found.iter().flat_map(|f| [Some(f.id), f.beside(frame)]).flatten();
-        let instances = PlacedInstances::look_up(instances_among(ids), setting.scene, locator, view);
-        retain_what_is_before(&mut found, setting, frame, &instances);
-        if found.is_empty() {
-            return;
-        }
-        let mut shaded = shade_fragments(found, setting, &instances, |f| {
-            pixel_centre(f.pixel % view.width, f.pixel / view.width)
-        });
+        let found = fragments(first as u32..(first + pixels.len() / width) as u32);
+        let mut shaded = shade_what_shows(found, setting, frame, locator);
         shaded.sort_unstable_by(|a, b| {
             let (a, b) = (&a.fragment, &b.fragment);
             a.pixel.cmp(&b.pixel).then(b.depth.total_cmp(&a.depth)).then(a.id.cmp(&b.id))
@@ -118,6 +108,50 @@ pub(super) fn composite(
             *pixel = over(layers.iter().map(|s| s.color), Vec4::from_array(*pixel)).to_array();
         }
     });
+}
+
+/// The instances with a fragment that shows, ascending, each with the depth of its nearest such fragment.
+///
+/// As in [`composite`], a fragment shows where it is before what is opaque and its alpha is above 0.
+pub(super) fn instances_that_show(
+    setting: &Setting,
+    frame: &Frame,
+    locator: &InstanceLocator,
+    fragments: &(impl Fn(Range<u32>) -> Vec<Fragment> + Sync),
+) -> Vec<(u32, f32)> {
+    let (rows, height) = (rows_of_a_band(&frame.view), frame.view.height);
+    let bands = (0..height.div_ceil(rows)).into_par_iter().flat_map_iter(|band| {
+        let found = fragments(band * rows..((band + 1) * rows).min(height));
+        let shaded = shade_what_shows(found, setting, frame, locator);
+        nearest_of_each(shaded.iter().map(|s| (s.fragment.id.instance, s.fragment.depth)).collect())
+    });
+    nearest_of_each(bands.collect())
+}
+
+/// One depth of each instance, the nearest; ascending by instance.
+fn nearest_of_each(mut depths: Vec<(u32, f32)>) -> Vec<(u32, f32)> {
+    depths.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    depths.dedup_by_key(|d| d.0);
+    depths
+}
+
+fn rows_of_a_band(view: &View) -> u32 {
+    (BAND_PIXELS as u32 / view.width).max(1)
+}
+
+/// Of the fragments of a band those that show, in any order, with their colours.
+fn shade_what_shows(
+    mut found: Vec<Fragment>,
+    setting: &Setting,
+    frame: &Frame,
+    locator: &InstanceLocator,
+) -> Vec<Shaded> {
+    let view = &frame.view;
+    found.retain(|f| f.may_be_before(frame));
+    let ids = found.iter().flat_map(|f| [Some(f.id), f.beside(frame)]).flatten();
+    let instances = PlacedInstances::look_up(instances_among(ids), setting.scene, locator, view);
+    retain_what_is_before(&mut found, setting, frame, &instances);
+    shade_fragments(found, setting, &instances, |f| pixel_centre(f.pixel % view.width, f.pixel / view.width))
 }
 
 /// Fragments of one triangle usually come together, so that it is set up once.

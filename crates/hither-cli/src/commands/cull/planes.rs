@@ -4,6 +4,7 @@ use super::{Arguments, Found, MethodName};
 use crate::failure::Failure;
 use crate::files::Files;
 use crate::numbers::{count, grouped};
+use crate::options;
 use crate::outputs;
 use glam::DAffine3;
 use hither::conventions::View;
@@ -92,6 +93,7 @@ pub struct Planes {
     options: PlanesOptions,
     margin: f64,
     around: bool,
+    paper: bool,
     reasons: bool,
     map: Option<PathBuf>,
     /// Where everything was when the tree was made.
@@ -106,7 +108,7 @@ impl Planes {
         let options = PlanesOptions {
             occluders: wanted.occluders.unwrap_or(own.occluders),
             leaf_polygons: wanted.leaf.unwrap_or(own.leaf_polygons),
-            threads: usize::from(wanted.threads.unwrap_or(1)),
+            threads: options::threads(wanted.threads.unwrap_or(1)),
             ..own
         };
         Planes {
@@ -114,6 +116,7 @@ impl Planes {
             options,
             margin: arguments.margin,
             around: wanted.around,
+            paper: wanted.paper,
             reasons: arguments.reasons,
             map: wanted.map.clone(),
             poses: poses(index.scene()),
@@ -140,6 +143,17 @@ impl Planes {
         let visible = self.instances(&culled);
         let polygons = self.reasons.then(|| self.polygons(index));
         Ok(Found { visible, reasons: None, polygons, counters: self.counters(&culled), time })
+    }
+
+    /// What the report says of how it is done.
+    pub fn settings(&self) -> Value {
+        json!({
+            "around": self.around || self.margin > 0.0,
+            "occluders": amount_json(self.options.occluders),
+            "leaf": amount_json(self.options.leaf_polygons),
+            "paper": self.paper,
+            "threads": self.options.threads,
+        })
     }
 
     /// Writes the map of the last frame, if one is asked for.
@@ -244,6 +258,13 @@ fn counted(polygons: &[Judged], state: State) -> usize {
 
 fn poses(scene: &Scene) -> Vec<DAffine3> {
     scene.instances().into_iter().map(|instance| instance.world_from_mesh).collect()
+}
+
+fn amount_json(amount: Amount) -> Value {
+    match amount {
+        Amount::Fixed(number) => number.into(),
+        Amount::Automatic => "auto".into(),
+    }
 }
 
 fn amount(text: &str) -> Result<Amount, String> {

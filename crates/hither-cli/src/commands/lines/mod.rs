@@ -80,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     json.insert("scene".into(), arguments.scene.as_str().into());
     json.insert("triangles".into(), scene.instanced_triangle_count().into());
     json.insert("instances".into(), scene.instance_count().into());
-    json.insert("threads".into(), arguments.threads.into());
+    json.insert("threads".into(), rayon::current_num_threads().into());
     json.insert("read_ms".into(), report::milliseconds(read_time));
     json.insert("prepare_ms".into(), report::milliseconds(prepare_time));
     json.insert("frames".into(), frames.into());

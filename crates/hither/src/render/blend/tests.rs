@@ -187,6 +187,45 @@ fn repeated_fragments_count_once_and_bands_do_not_show() {
     assert!(once.pixels.iter().all(|p| p[3] == 0.0 || (p[3] - 0.5).abs() < 1e-6));
 }
 
+#[test]
+fn blended_instances_are_those_without_which_the_picture_is_another() {
+    let turned = |angle: f64, z: f64| Transform::Trs {
+        translation: DVec3::new(0.0, 0.0, z),
+        rotation: DQuat::from_rotation_y(angle),
+        scale: DVec3::splat(0.5),
+    };
+    let before = [at(0.5, 0.0, 1.0), at(-0.5, 0.0, 2.0), at(0.0, 0.3, 0.001)];
+    let hidden = [at(0.0, 0.0, -0.001), at(0.0, 0.0, -0.5)];
+    let other = [turned(0.7, 0.0), at(0.9, 0.0, -3.0), at(9.0, 0.0, 0.0)];
+    let panes: Vec<Transform> = [&before[..], &hidden, &other].concat();
+    let solid = panes.len() as u32;
+    let faint = |without: Option<u32>, k: u32| {
+        // Pane 2 is before the wall, and wholly transparent.
+        let alpha = if without == Some(k) || k == 2 { 0.0 } else { 0.3 };
+        glass(1.0, 0.8, 0.1, alpha)
+    };
+    let made = |without: Option<u32>| {
+        let mut materials: Vec<Material> = (0..solid).map(|k| faint(without, k)).collect();
+        materials.push(colored(Vec4::new(0.2, 0.3, 0.4, 1.0), AlphaMode::Opaque));
+        let mut parts: Vec<_> = (0..solid).map(|k| (square(Some(k)), panes[k as usize])).collect();
+        parts.push((square(Some(solid)), at(0.0, 0.0, 0.0)));
+        scene(materials, parts)
+    };
+    let (scene, view) = (made(None), View { width: 400, height: 300, ..front_view() });
+    let whole = picture(&scene, &view);
+    let expected: Vec<u32> = (0..solid).filter(|&k| picture(&made(Some(k)), &view) != whole).collect();
+    assert_eq!(expected, [0, 1, 5, 6]);
+    let frame = frame(&scene, &view);
+    for threads in [1, 3] {
+        let found = Shader::new(&scene, threads).blended_instances(&scene, &frame);
+        assert_eq!(found.iter().map(|f| f.0).collect::<Vec<_>>(), expected);
+        let distances = found.iter().map(|f| view.projection.distance(f.1));
+        // The turned pane, of side 1, comes forward by half the sine of its turn.
+        let nearest = [4.0, 3.0, 5.0 - 0.5 * 0.7f64.sin(), 8.0];
+        assert!(distances.zip(nearest).all(|(d, e)| (d - e).abs() < 0.02), "{found:?}");
+    }
+}
+
 /// The distance along the view axis at which a ray meets a triangle [Möller & Trumbore 1997].
 fn meet(origin: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     let (ab, ac) = (b - a, c - a);

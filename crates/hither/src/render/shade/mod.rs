@@ -17,7 +17,7 @@ pub(super) use surface::{Normals, Placed, PlacedInstances, SeenTriangle, Setting
 pub(super) use triangle::{Rays, TriangleInView, depth_at};
 
 use super::Frame;
-use super::blend::{BlendedTriangles, Fragment, composite};
+use super::blend::{BlendedTriangles, Fragment, composite, instances_that_show};
 use crate::conventions::{NO_ID, SurfaceId};
 use crate::index::SceneIndex;
 use crate::scene::{InstanceLocator, Scene, TexturePyramids};
@@ -34,7 +34,7 @@ pub enum Shading {
     /// Base colour, lit on interpolated normals where the mesh has them.
     #[default]
     Smooth,
-    /// A colour for each instance.
+    /// A colour for each instance, a little lighter or darker from triangle to triangle.
     Ids,
     /// Distance as grey, near white, over the range that the frame shows.
     Depth,
@@ -113,14 +113,40 @@ impl Shader {
         shading: Shading,
         fragments: impl Fn(Range<u32>) -> Vec<Fragment> + Sync,
     ) -> Image {
+        self.on_threads(|shader| shader.shade_here(scene, frame, shading, &fragments))
+    }
+
+    /// The blended instances that show in `frame`, which must be of `scene` in its present pose: at some pixel centre
+    /// a surface of theirs is before what is opaque or masked, and its alpha is above 0. Ascending by number, each
+    /// with the depth of its nearest such point. Blended surfaces do not hide each other, not even where alpha is 1.
+    pub fn blended_instances(&mut self, scene: &Scene, frame: &Frame) -> Vec<(u32, f32)> {
+        let blended = BlendedTriangles::find(scene, &frame.view);
+        self.on_threads(|shader| {
+            shader.prepare_blended_textures(scene);
+            let setting = shader.setting(scene, frame, Shading::Flat);
+            instances_that_show(&setting, frame, &shader.locator, &|rows| blended.fragments(rows))
+        })
+    }
+
+    fn on_threads<T: Send>(&mut self, work: impl FnOnce(&mut Shader) -> T + Send) -> T {
         let threads = self.threads.take();
-        let mut work = || self.shade_here(scene, frame, shading, &fragments);
-        let image = match &threads {
-            Some(pool) => pool.install(work),
-            None => work(),
+        let made = match &threads {
+            Some(pool) => pool.install(|| work(self)),
+            None => work(self),
         };
         self.threads = threads;
-        image
+        made
+    }
+
+    /// What `frame` is shaded with, once the textures of all that is shaded are prepared.
+    fn setting<'a>(&'a self, scene: &'a Scene, frame: &Frame, shading: Shading) -> Setting<'a> {
+        Setting {
+            scene,
+            rays: Rays::new(&frame.view),
+            light: Light::new(frame.view.view_from_world.matrix3),
+            normals: shading.normals(),
+            pyramids: &self.pyramids,
+        }
     }
 
     fn shade_here(
@@ -158,13 +184,7 @@ impl Shader {
         if shading.shows_blended() {
             self.prepare_blended_textures(scene);
         }
-        let setting = Setting {
-            scene,
-            rays: Rays::new(&frame.view),
-            light: Light::new(frame.view.view_from_world.matrix3),
-            normals: shading.normals(),
-            pyramids: &self.pyramids,
-        };
+        let setting = self.setting(scene, frame, shading);
         let mut image = shade_opaque(&setting, frame, shading, &instances);
         if shading.shows_blended() {
             composite(&mut image, &setting, frame, &self.locator, fragments);
