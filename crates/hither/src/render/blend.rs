@@ -11,8 +11,9 @@ use super::shade::{
 };
 use crate::conventions::{Projection, SurfaceId, View};
 use crate::geometry::Aabb;
+use crate::raster::{Footprint, ScreenFromObject};
 use crate::scene::{Content, Group, InstanceLocator, Mesh, Scene};
-use glam::{DAffine3, DVec2, DVec3, Vec4};
+use glam::{DAffine3, DVec2, Vec4};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -181,7 +182,8 @@ fn over(layers: impl Iterator<Item = Vec4>, ground: Vec4) -> Vec4 {
     sum + ground * (1.0 - sum.w)
 }
 
-/// The blended triangles that may be seen in a view, found by walking the scene: plain, and exact.
+/// The blended triangles that may be seen in a view, found by walking the scene. They cover the pixels that they would if
+/// they were opaque, so that an edge between the two kinds is drawn once.
 ///
 /// Groups without blended surfaces are never entered, and what is outside the view is left out.
 #[derive(Clone, Debug)]
@@ -189,7 +191,7 @@ pub struct BlendedTriangles<'a> {
     scene: &'a Scene,
     view: View,
     rays: Rays,
-    instances: Vec<Placed>,
+    instances: Vec<(Placed, ScreenFromObject)>,
     /// Ascending by first row.
     triangles: Vec<BlendedTriangle>,
 }
@@ -242,18 +244,21 @@ impl<'a> BlendedTriangles<'a> {
             }
             groups.push(total);
         }
-        let mut stack = vec![(scene.root as usize, view.view_from_world, 0u64)];
-        while let Some((group, view_from_group, mut number)) = stack.pop() {
+        let mut stack =
+            vec![(scene.root as usize, view.view_from_world, ScreenFromObject::of_view(view), 0u64)];
+        while let Some((group, view_from_group, at, mut number)) = stack.pop() {
             for (node, pose) in scene.groups[group].nodes.iter().zip(&poses[group]) {
                 let inner = holding(node.content, &groups);
                 let view_from_node = view_from_group * *pose;
                 if !inner.blended.is_empty() && may_be_seen(view, &inner.blended.transformed(&view_from_node))
                 {
+                    // Composed as where opaque surfaces are drawn, so that both are snapped alike.
+                    let at = at.after(pose);
                     match node.content {
                         Content::Mesh(mesh) => {
-                            found.add(number as u32, Placed { mesh, view_from_mesh: view_from_node });
+                            found.add(number as u32, Placed { mesh, view_from_mesh: view_from_node }, at);
                         }
-                        Content::Group(g) => stack.push((g as usize, view_from_node, number)),
+                        Content::Group(g) => stack.push((g as usize, view_from_node, at, number)),
                         Content::Nothing => {}
                     }
                 }
@@ -264,23 +269,16 @@ impl<'a> BlendedTriangles<'a> {
         found
     }
 
-    fn add(&mut self, instance: u32, placed: Placed) {
-        let mirrored = placed.view_from_mesh.matrix3.determinant() < 0.0;
+    fn add(&mut self, instance: u32, placed: Placed, screen_from_mesh: ScreenFromObject) {
         let at = self.instances.len() as u32;
-        self.instances.push(placed);
-        for primitive in &self.scene.meshes[placed.mesh as usize].primitives {
-            let Some(material) = primitive.material.filter(|&m| self.scene.is_blended(Some(m))) else {
+        self.instances.push((placed, screen_from_mesh));
+        let scene = self.scene;
+        for primitive in &scene.meshes[placed.mesh as usize].primitives {
+            if !scene.is_blended(primitive.material) {
                 continue;
-            };
-            let double_sided = self.scene.materials[material as usize].double_sided;
+            }
             for triangle in primitive.triangles.clone() {
-                let corners = placed.corners(self.scene, triangle);
-                let turned = TriangleInView::new(&self.rays, corners).orientation;
-                let is_front = if mirrored { turned < 0.0 } else { turned > 0.0 };
-                if turned == 0.0 || !(is_front || double_sided) {
-                    continue;
-                }
-                let rows = rows_of(&self.view, corners);
+                let rows = self.footprint(at, triangle).rows();
                 if !rows.is_empty() {
                     self.triangles.push(BlendedTriangle {
                         id: SurfaceId { instance, triangle },
@@ -293,19 +291,28 @@ impl<'a> BlendedTriangles<'a> {
         }
     }
 
+    /// The pixels of a triangle, empty if it faces away.
+    fn footprint(&self, placed: u32, triangle: u32) -> Footprint {
+        let (Placed { mesh, .. }, at) = &self.instances[placed as usize];
+        let mesh = &self.scene.meshes[*mesh as usize];
+        let corners = mesh.triangles[triangle as usize].map(|v| mesh.positions[v as usize].to_array());
+        let material = mesh.material_of(triangle);
+        let two_sided = material.is_some_and(|m| self.scene.materials[m as usize].double_sided);
+        Footprint::new(&corners, at, two_sided, (self.view.width, self.view.height))
+    }
+
     /// Every fragment with its pixel centre in `rows` of the image, whatever lies before it.
     pub fn fragments(&self, rows: Range<u32>) -> Vec<Fragment> {
         let mut fragments = Vec::new();
         let begun = self.triangles.partition_point(|t| t.first_row < rows.end);
         for t in self.triangles[..begun].iter().filter(|t| t.end_row > rows.start) {
-            let corners = self.instances[t.placed as usize].corners(self.scene, t.id.triangle);
+            let corners = self.instances[t.placed as usize].0.corners(self.scene, t.id.triangle);
             let in_view = TriangleInView::new(&self.rays, corners);
+            let footprint = self.footprint(t.placed, t.id.triangle);
             for y in t.first_row.max(rows.start)..t.end_row.min(rows.end) {
-                for x in in_view.columns(y, self.view.width) {
-                    let depth = in_view
-                        .hit(pixel_centre(x, y))
-                        .and_then(|weights| depth_at(&self.view.projection, in_view.distance(weights)));
-                    if let Some(depth) = depth {
+                for x in footprint.columns(y) {
+                    let distance = in_view.distance(in_view.weights(pixel_centre(x, y)));
+                    if let Some(depth) = depth_at(&self.view.projection, distance) {
                         fragments.push(Fragment { pixel: y * self.view.width + x, depth, id: t.id });
                     }
                 }
@@ -348,27 +355,6 @@ fn may_be_seen(view: &View, bounds: &Aabb) -> bool {
         || bounds.min.y > half_height * reach
         || bounds.max.y < -half_height * reach;
     !outside
-}
-
-/// Rows of the image whose pixel centres a triangle in view space may cover.
-fn rows_of(view: &View, corners: [DVec3; 3]) -> Range<u32> {
-    let height = f64::from(view.height);
-    let scale = view.pixels_per_unit();
-    let (mut top, mut bottom) = (f64::INFINITY, f64::NEG_INFINITY);
-    for c in corners {
-        let up = match view.projection {
-            // Partly behind the near plane: it may reach any row.
-            Projection::Perspective { near, .. } if -c.z < near => return 0..view.height,
-            Projection::Perspective { .. } => c.y / -c.z,
-            Projection::Orthographic { .. } => c.y,
-        };
-        let y = height * 0.5 - up * scale;
-        (top, bottom) = (top.min(y), bottom.max(y));
-    }
-    // Half a pixel to the centres, and a little for rounding.
-    let first = (top - 0.51).ceil().clamp(0.0, height);
-    let end = ((bottom - 0.49).floor() + 1.0).clamp(0.0, height);
-    first as u32..(end as u32).max(first as u32)
 }
 
 #[cfg(test)]

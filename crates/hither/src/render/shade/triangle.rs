@@ -9,7 +9,6 @@
 
 use crate::conventions::{Projection, View};
 use glam::{DVec2, DVec3};
-use std::ops::Range;
 
 /// The rays through the points of a view's image.
 #[derive(Clone, Copy, Debug)]
@@ -88,43 +87,6 @@ impl TriangleInView {
         [by(DVec3::new(a.x, b.x, c.x)), by(DVec3::new(a.y, b.y, c.y))]
     }
 
-    /// Exact weights of the point of the triangle seen at `at`; `None` outside. A point on an edge belongs
-    /// to the triangle on whose left or top it is, so that a shared edge is counted once.
-    pub(in crate::render) fn hit(&self, at: DVec2) -> Option<DVec3> {
-        let side = self.orientation.signum();
-        let e = self.edge_values(at) * side;
-        for i in 0..3 {
-            let slope = self.edges[i] * side;
-            let left_or_top = slope.x > 0.0 || (slope.x == 0.0 && slope.y > 0.0);
-            // Written so that NaN is outside.
-            if !(e[i] > 0.0 || (e[i] == 0.0 && left_or_top)) {
-                return None;
-            }
-        }
-        let weights = e / e.element_sum();
-        (self.orientation != 0.0 && weights.is_finite()).then_some(weights)
-    }
-
-    /// Columns of row `y` of an image `width` pixels wide in which [`TriangleInView::hit`] may find it.
-    pub(in crate::render) fn columns(&self, y: u32, width: u32) -> Range<u32> {
-        let side = self.orientation.signum();
-        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        for edge in self.edges {
-            let (slope, rest) = (edge.x * side, (edge.y * (f64::from(y) + 0.5) + edge.z) * side);
-            // Where the edge crosses the row; a level edge is left to `hit`.
-            let crossing = -rest / slope;
-            if slope > 0.0 && crossing.is_finite() {
-                low = low.max(crossing);
-            } else if slope < 0.0 && crossing.is_finite() {
-                high = high.min(crossing);
-            }
-        }
-        // Centres between the crossings, and one pixel more for rounding.
-        let first = (low - 1.5).clamp(0.0, f64::from(width)).floor();
-        let end = (high + 1.5).clamp(0.0, f64::from(width)).ceil();
-        first as u32..end as u32
-    }
-
     /// Distance along the view axis, metres, at the given weights.
     pub(in crate::render) fn distance(&self, weights: DVec3) -> f64 {
         self.distances.dot(weights)
@@ -187,7 +149,6 @@ mod tests {
             let at = project(&view, seen);
             let found = triangle.weights(at);
             prop_assert!((found - w).length() < 1e-8, "{} is not {}", found, w);
-            prop_assert!((triangle.hit(at).unwrap() - w).length() < 1e-8);
             prop_assert!((triangle.distance(found) + seen.z).abs() < 1e-7);
         }
 
@@ -207,26 +168,6 @@ mod tests {
                 let difference = (triangle.weights(at + offset * step) - triangle.weights(at)) / step;
                 prop_assert!((difference - slope).length() < 1e-3 * (1.0 + slope.length()));
             }
-        }
-
-        /// Two triangles on either side of an edge share no point and leave none out, however they lie.
-        #[test]
-        fn a_quad_cut_along_its_diagonal_is_covered_once(
-            a in any_point(), b in any_point(), c in any_point(), x in 0..32u32, y in 0..24u32,
-        ) {
-            let view = view(PINHOLE);
-            let d = a + c - b;
-            let at = DVec2::new(f64::from(x) * 2.0, f64::from(y) * 2.0);
-            let [first, second] = [[a, b, c], [a, c, d]].map(|t| TriangleInView::new(&Rays::new(&view), t));
-            let [other, another] = [[a, b, d], [b, c, d]].map(|t| TriangleInView::new(&Rays::new(&view), t));
-            let hits = |t: &TriangleInView| u32::from(t.hit(at).is_some());
-            let (one, two) = (hits(&first) + hits(&second), hits(&other) + hits(&another));
-            prop_assert!(one <= 1 && two <= 1);
-            // The two diagonals cut the same quad; rounding may move its outline by next to nothing.
-            let near_outline = [&first, &second, &other, &another].iter().any(|t| {
-                t.edges.iter().any(|e| (e.dot(at.extend(1.0))).abs() < 1e-9)
-            });
-            prop_assert!(one == two || near_outline);
         }
 
         #[test]
