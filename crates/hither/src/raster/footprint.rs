@@ -66,7 +66,7 @@ fn snapped(corners: &[[f32; 3]; 3], at: &ScreenFromObject) -> Option<[[i32; 2]; 
         let scale = if at.perspective { 1.0 / w } else { 1.0 };
         for (to, v) in snapped.iter_mut().zip([x * scale, y * scale]) {
             // Written so that NaN is not inside.
-            if !(d <= w && v >= GUARD_MIN * 256.0 && v <= GUARD_MAX * 256.0) {
+            if !(d <= w && (GUARD_MIN * 256.0..=GUARD_MAX * 256.0).contains(&v)) {
                 return None;
             }
             *to = v.round_ties_even() as i32;
