@@ -34,12 +34,12 @@ const PICTURES: [u64; 6] = [
 
 /// Depths of occlusion buffers, and their verdicts.
 const BUFFERS: [u64; 6] = [
-    0x9c4c_a469_21df_ef84,
-    0x9fdb_c1ea_234d_142d,
-    0xe6d8_307d_5fa1_8e81,
-    0x5fca_95ef_bb14_785f,
-    0xc7a0_695f_43b9_588c,
-    0x8c2c_78f3_85e8_1f50,
+    0x80c9_4780_6d59_4569,
+    0x2a19_735d_835e_7648,
+    0xe311_7388_71b3_aa97,
+    0xb91f_09ea_eb9c_30a3,
+    0x996b_6f82_1d41_f74d,
+    0xabc3_1d53_7da6_b562,
 ];
 
 /// Depths of sampled buffers, which occluder was drawn, and their verdicts.
