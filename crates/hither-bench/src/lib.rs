@@ -64,7 +64,9 @@ pub fn run(name: Option<&str>, options: &Options) -> Result<Report, BenchError> 
         known.dedup();
         return Err(BenchError::UnknownTable { name: name.to_owned(), known: known.join(", ") });
     }
-    let mut report = Report::of_this_machine(format!("{:?}", RenderOptions::default().level));
+    let level = format!("{:?}", RenderOptions::default().level);
+    // The name alone, and not what is inside.
+    let mut report = Report::of_this_machine(level.split('(').next().unwrap_or(&level).to_owned());
     for table in wanted {
         (options.progress)(table.name);
         report.tables.push(table.make(options)?);

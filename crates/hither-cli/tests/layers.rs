@@ -306,9 +306,11 @@ fn a_transparent_part_that_is_split_tints_what_is_behind_it_once() {
                 ["layers", &scene, "--split", split, "--samples", samples, "--verify", "--json", "-"];
             let view = ["--eye", "-0.4,0.3,4", "--target", "0,0,-2", "--size", "240x160", "-q"];
             let json = report(&[&arguments[..], &view[..]].concat());
-            // Verified is against the scene that is not split: neither a gap shows, nor anything twice.
-            let off = json["frames"][0]["verification"]["largest_difference"].as_f64().unwrap();
-            assert!(off < 1e-5, "{split}, {samples} samples: {off}");
+            // Verified is against the scene that is not split: neither a gap shows, nor anything twice. But new corners
+            // are snapped, which may move a sample at the outline from one side to the other.
+            let verified = &json["frames"][0]["verification"];
+            let off = verified["beyond_one_in_255"]["elsewhere"].as_u64().unwrap();
+            assert!(off <= 1, "{split}, {samples} samples: {verified}");
             assert_eq!(json["parts"].as_array().unwrap().len(), 5 + pieces, "{split}");
         }
     }

@@ -87,6 +87,9 @@ fn make(table: &mut Table, options: &Options) -> Result<(), String> {
     table
         .notes
         .push("A node of the bvh holds up to sixteen boxes, each tested and counted as a cube.".into());
+    table.notes.push(
+        "Without the pyramid his cubes and polygons met a plain z-buffer; ours are not asked so.".into(),
+    );
     Ok(())
 }
 

@@ -69,6 +69,7 @@ pub static TABLES: &[TableInfo] = &[
     order::CANYON,
     order::RIVALS,
     cull::INFO,
+    cull::OF_SCENES,
     planes::TREE,
     planes::CULLED,
     planes::SPEED,

@@ -1,6 +1,9 @@
 //! Culling: the occlusion buffer on the worlds and boxes that other buffers are measured on.
 
+mod scenes;
 mod truth;
+
+pub(crate) use scenes::INFO as OF_SCENES;
 
 use super::{TableInfo, column, view, world};
 use crate::Options;

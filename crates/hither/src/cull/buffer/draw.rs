@@ -7,7 +7,7 @@ use super::fill::{Corner, Goes, Joint, Outline, fill, first_pixel, last_pixel};
 use super::loose::{LooseFaces, Sixteen, fill_one, set_up};
 use super::mosaic::{Area, Drawing, Mosaic};
 use super::occluder::{ENDS, Face, Occluder, Patch};
-use super::pass::{MOST_MARGIN_PX, Pass};
+use super::pass::Pass;
 use super::place::{Placed, Placing, Sizes};
 use super::surface::Surface;
 use super::{Drawn, Margin};
@@ -293,7 +293,7 @@ impl Band {
         } else {
             self.clipped_turns(standing, patch, &placing, faces);
         }
-        let margin_px = if jointly { self.margin_px(standing) } else { Some(0) };
+        let margin_px = if jointly { pass.margin_px(standing, self.placed.nearest) } else { Some(0) };
         let Some(margin_px) = margin_px else { return };
         drawn.patches += 1;
         let count = self.turns.iter().filter(|turn| **turn != 0).count();
@@ -460,21 +460,6 @@ impl Band {
                 }
             }
         }
-    }
-
-    /// Pixels that the patch's outline may move by under the margin; `None` if it is too near to say.
-    fn margin_px(&self, standing: &Standing) -> Option<i32> {
-        let Some(Margin { metres, pixels, depth }) = standing.margin else { return Some(0) };
-        let nearest = f64::from(self.placed.nearest) * 1.000_001;
-        let distance = if standing.at.perspective { standing.at.d[3] / nearest } else { 1.0 };
-        // Nearer than that, an eye that moved towards it would have its near plane behind it.
-        let too_near = if standing.at.perspective {
-            distance < standing.at.d[3] + metres
-        } else {
-            nearest + DEPTH_IS_LESS + depth > 1.0
-        };
-        let reach = (metres * pixels / distance * 1.000_001).ceil();
-        (!too_near && reach <= MOST_MARGIN_PX).then_some(reach as i32)
     }
 
     /// Places a patch that needs no clipping and says which way its faces turn.

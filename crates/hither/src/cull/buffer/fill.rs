@@ -18,6 +18,7 @@
 //! `e = ⌊(E + bias) / 256⌋ = A·px + B·py + C` is a whole number with whole steps, and `e ≥ 0` is the fill
 //! rule exactly. A pixel's square, widened by the slack, reaches `h = (|A| + |B|)·(128 + slack)` from there.
 
+use super::pass::erode;
 use super::surface::Surface;
 use super::tile::{Row, TilePlane, blocks_in, blocks_of, tile_plane};
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
@@ -188,25 +189,6 @@ impl Joint {
         }
         self.dirty.clear();
     }
-}
-
-/// Least values over windows of 2·radius + 1 elements, each `width` wide; beyond both ends is 0.
-#[inline(always)]
-fn erode(values: &mut Vec<f32>, width: usize, radius: usize) {
-    let padding = vec![0.0; radius * width];
-    let count = values.len();
-    let mut wide = [&padding, values.as_slice(), &padding].concat();
-    // Windows of a power of two, doubled until two of them span the whole.
-    let mut length = 1;
-    while length * 2 <= 2 * radius + 1 {
-        for i in 0..wide.len() - length * width {
-            wide[i] = wide[i].min(wide[i + length * width]);
-        }
-        length *= 2;
-    }
-    let shift = (2 * radius + 1 - length) * width;
-    values.clear();
-    values.extend((0..count).map(|i| wide[i].min(wide[i + shift])));
 }
 
 /// What an edge of a face is near pixels, e being as above.

@@ -164,7 +164,7 @@ pub(super) fn set_up<S: Simd>(simd: S, faces: &LooseFaces, standing: &Standing, 
     }
     let Some(mut placing) = Placing::new(at, &standing.sizes, least_w) else { return Sorted::default() };
     if standing.margin.is_some() {
-        match standing.erosion_from(least_w) {
+        match standing.erosion_from(standing.sizes.least_w(least_w)) {
             Some(erosion) if at.perspective => placing.slack += erosion,
             // They are patches like others.
             _ => return Sorted { draw: 0, clip: faces.lanes },

@@ -19,7 +19,7 @@ use super::place::Placing;
 const MOST_SLACK: f64 = 24.0 * 256.0;
 
 /// Patches that would lose more pixels than this are not drawn.
-pub(super) const MOST_MARGIN_PX: f64 = 256.0;
+const MOST_MARGIN_PX: f64 = 256.0;
 
 /// A patch is drawn again beyond so many times the distance.
 const FARTHER: f64 = 4.0;
@@ -37,7 +37,7 @@ pub(super) struct Pass {
     /// With the erosion in its slack, or to be eroded jointly.
     pub placing: Placing,
     pub jointly: bool,
-    /// No point of what is drawn is nearer, along the view.
+    /// No point of what is drawn is nearer, along the view; 1 in an orthographic view.
     distance: f64,
 }
 
@@ -121,9 +121,23 @@ impl Pass {
         let mut placing = Placing::new(&at, &standing.sizes, distance)?;
         // Depths are those of the view, not of one that begins there.
         placing.shrink *= near / distance * (1.0 - 1e-15);
+        let distance = standing.sizes.least_w(distance);
+        if distance < near + margin.metres {
+            return None;
+        }
         let erosion = slack_for(margin, distance);
         placing.slack += erosion.unwrap_or(0);
         Some(Pass { open: Open { clear: false, ..open }, placing, jointly: erosion.is_none(), distance })
+    }
+
+    /// Pixels to erode what is drawn jointly by; `None` if some of it is too near to the near plane, or they are too many.
+    /// `nearest` is the largest depth of what is drawn.
+    pub fn margin_px(&self, standing: &Standing, nearest: f32) -> Option<i32> {
+        let margin = standing.margin?;
+        let too_near =
+            !standing.at.perspective && f64::from(nearest) * 1.000_001 + DEPTH_IS_LESS + margin.depth > 1.0;
+        let px = (margin.metres * margin.pixels / self.distance * 1.000_01).ceil();
+        (!too_near && px <= MOST_MARGIN_PX).then_some(px as i32)
     }
 
     /// The next, if it is worth its while.
@@ -146,4 +160,23 @@ impl Pass {
         }
         Pass::beyond(standing, self.open, margin, distance)
     }
+}
+
+/// Least values over windows of 2·radius + 1 elements, each `width` wide; beyond both ends is 0.
+#[inline(always)]
+pub(super) fn erode(values: &mut Vec<f32>, width: usize, radius: usize) {
+    let padding = vec![0.0; radius * width];
+    let count = values.len();
+    let mut wide = [&padding, values.as_slice(), &padding].concat();
+    // Windows of a power of two, doubled until two of them span the whole.
+    let mut length = 1;
+    while length * 2 <= 2 * radius + 1 {
+        for i in 0..wide.len() - length * width {
+            wide[i] = wide[i].min(wide[i + length * width]);
+        }
+        length *= 2;
+    }
+    let shift = (2 * radius + 1 - length) * width;
+    values.clear();
+    values.extend((0..count).map(|i| wide[i].min(wide[i + shift])));
 }

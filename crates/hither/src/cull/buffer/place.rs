@@ -51,6 +51,12 @@ impl Sizes {
         let depth = if at.perspective { 0.0 } else { size(&at.d, third) };
         Sizes { screen: size(&at.x, x).max(size(&at.y, y)), w, depth }
     }
+
+    /// What W is at least where it was found to be so much.
+    #[inline(always)]
+    pub fn least_w(&self, found: f64) -> f64 {
+        found - self.w
+    }
 }
 
 /// A transform with what its arithmetic may be off by.
