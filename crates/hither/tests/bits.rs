@@ -49,10 +49,10 @@ const SAMPLED: [u64; 3] = [0xccec_8cfc_bdcd_8a01, 0x83ad_7fb2_0a7b_fece, 0x01af_
 const FOUND: [u64; 6] = [
     0x5d3b_5ded_f0c8_5b5c,
     0xefff_a21f_8b41_a569,
-    0x150b_dee7_cfdf_7890,
+    0xbb5c_546b_5e1e_7798,
     0xc9d4_018c_ed23_4f74,
     0xbd45_0886_40ed_e9c7,
-    0x6ca2_9649_259b_9e5c,
+    0x5c3c_39b5_b4f5_3c63,
 ];
 
 /// A digest of numbers in their order (FNV-1a).

@@ -85,6 +85,9 @@ struct Seen {
     judged: usize,
 }
 
+/// Pixels of a picture for which [`CullOptions::least_px_a_face`] is said.
+const FULL_SIZE: f64 = 1920.0 * 1080.0;
+
 /// What the walk's options come to in pixels of the buffer.
 #[derive(Clone, Copy)]
 struct Thresholds {
@@ -95,14 +98,17 @@ struct Thresholds {
 }
 
 impl Thresholds {
-    fn new(options: &CullOptions) -> Thresholds {
+    fn new(options: &CullOptions, frame: &Frame) -> Thresholds {
         let n = options.coarseness.max(1);
+        let pixels = f64::from(frame.view.width) * f64::from(frame.view.height) * f64::from(n).powi(2);
+        // What a piece hides is a share of the picture, and what it costs is its faces.
+        let share = (pixels / FULL_SIZE).min(1.0);
         let length = |px: u32| px.div_ceil(n).min(1 << 20);
         let area = |px: u32| px.div_ceil(n.saturating_mul(n));
         Thresholds {
             occluder_px: area(options.least_occluder_px),
             piece_px: length(options.least_piece_px) as i32,
-            px_a_face: area(options.least_px_a_face).min(1 << 20) as i32,
+            px_a_face: area((f64::from(options.least_px_a_face) * share).ceil() as u32).min(1 << 20) as i32,
         }
     }
 }
@@ -156,7 +162,7 @@ pub(super) fn cull<S: Simd>(
         occluders,
         frame,
         options,
-        least: Thresholds::new(options),
+        least: Thresholds::new(options, frame),
         band,
         contexts: Vec::new(),
         queue: NearestFirst::new(),
