@@ -1,45 +1,23 @@
 //! The binary as a user meets it: exit codes, one clear line for each mistake, reports, and no partial files.
 
+mod common;
+
+use common::{Folder, done, hither};
 use serde_json::{Value, json};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 /// A small world with cameras and an animation.
 const WORLD: &str = "world:office?n=1";
 
-/// A folder of its own for a test, removed when dropped.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("hither-cli-{name}-{}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir_all(&path).unwrap();
-        Folder(path)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).display().to_string()
-    }
-
-    fn names(&self) -> Vec<String> {
-        let entries = fs::read_dir(&self.0).unwrap();
-        let mut names: Vec<String> =
-            entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-fn hither(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hither")).args(arguments).output().unwrap()
+/// What is in a folder.
+fn names(folder: &Folder) -> Vec<String> {
+    let entries = fs::read_dir(&folder.0).unwrap();
+    let mut names: Vec<String> =
+        entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
 }
 
 fn stdout(output: &Output) -> String {
@@ -63,14 +41,6 @@ fn refused(arguments: &[&str], code: i32, words: &[&str]) {
         assert!(errors[0].contains(word), "{arguments:?}: no `{word}` in: {text}");
     }
     assert!(output.stdout.is_empty(), "{arguments:?}: {}", stdout(&output));
-}
-
-/// Runs `arguments`, which must do their work.
-#[track_caller]
-fn done(arguments: &[&str]) -> Output {
-    let output = hither(arguments);
-    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
-    output
 }
 
 #[test]
@@ -114,7 +84,7 @@ fn an_input_that_fails_is_code_1() {
     refused(&["render", WORLD, "-o", &picture, "--size", "20000x1"], 1, &["20000x1", "16384"]);
     fs::write(folder.0.join("noise.glb"), "glTX and more").unwrap();
     refused(&["render", &folder.path("noise.glb"), "-o", &picture], 1, &["noise.glb"]);
-    assert_eq!(folder.names(), ["noise.glb"]);
+    assert_eq!(names(&folder), ["noise.glb"]);
 }
 
 /// Under a limit of its own, which Linux keeps.
@@ -131,7 +101,7 @@ fn a_picture_that_there_is_no_memory_for_is_refused() {
     assert_eq!(output.status.code(), Some(1));
     let text = stderr(&output);
     assert!(text.lines().count() == 1 && text.contains("16384x16384") && text.contains("GiB"), "{text}");
-    assert!(folder.names().is_empty());
+    assert!(names(&folder).is_empty());
 }
 
 #[test]
@@ -143,7 +113,7 @@ fn an_output_that_cannot_be_written_is_refused_before_the_work() {
     refused(&["render", "no.glb", "-o", &missing, "--frames", "0..2"], 1, &["nowhere/x.0000.png"]);
     refused(&["render", "no.glb", "--json", &missing], 1, &["nowhere/x.png"]);
     refused(&["world", "no", "-o", &folder.path("nowhere/x.glb")], 1, &["nowhere/x.glb"]);
-    assert!(folder.names().is_empty());
+    assert!(names(&folder).is_empty());
 }
 
 #[test]
@@ -158,7 +128,7 @@ fn no_file_that_is_named_is_written_over_another() {
     fs::create_dir(folder.0.join("sheets")).unwrap();
     #[cfg(unix)]
     std::os::unix::fs::symlink("model.glb", folder.0.join("link.glb")).unwrap();
-    let before = (folder.names(), fs::read(scene).unwrap());
+    let before = (names(&folder), fs::read(scene).unwrap());
     for (command, named) in [
         ("info model.glb --json model.glb", "the scene"),
         ("render model.glb -o x.png --json model.glb", "the scene"),
@@ -193,7 +163,7 @@ fn no_file_that_is_named_is_written_over_another() {
         let arguments: Vec<String> = command.split(' ').map(word).collect();
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
         refused(&arguments, 1, &[&format!(": this is the file of {named}, too, and one would be lost")]);
-        assert_eq!((folder.names(), fs::read(scene).unwrap()), before, "{command}");
+        assert_eq!((names(&folder), fs::read(scene).unwrap()), before, "{command}");
     }
     // What the model names is known when it is read.
     fs::write(folder.0.join("m.obj"), "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
@@ -223,7 +193,7 @@ fn pictures_have_the_size_and_the_names_that_were_asked_for() {
     done(&["render", WORLD, "-o", &folder.path("one.png"), "--size", "64x48"]);
     done(&["render", WORLD, "-o", &folder.path("walk.png"), "--size", "16x16", "--frames", "3..5"]);
     done(&["render", WORLD, "-o", &folder.path("##-walk.EXR"), "--size", "16x16", "--frames", "9..10"]);
-    assert_eq!(folder.names(), ["09-walk.EXR", "one.png", "walk.0003.png", "walk.0004.png"]);
+    assert_eq!(names(&folder), ["09-walk.EXR", "one.png", "walk.0003.png", "walk.0004.png"]);
     let png = fs::read(folder.0.join("one.png")).unwrap();
     assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
     assert_eq!(png[16..24], [0, 0, 0, 64, 0, 0, 0, 48]);
@@ -465,7 +435,7 @@ fn places_beyond_all_numbers_are_refused_and_planes_too_far_apart_told() {
     ] {
         refused(&[arguments, &["--time", "1", "--size", "8x8"]].concat(), 1, &words);
     }
-    assert_eq!(folder.names(), ["grows.bin", "grows.gltf"]);
+    assert_eq!(names(&folder), ["grows.bin", "grows.gltf"]);
     let told = stderr(&done(&["render", &scene, "-o", &picture, "--size", "8x8"]));
     assert!(
         told.contains("camera 0: its planes are so far apart that depths within 6.0e-2 m are one"),
@@ -499,7 +469,7 @@ fn a_model_all_of_whose_faces_are_lost_is_code_1() {
         .unwrap();
     let (scene, picture) = (folder.path("lost.obj"), folder.path("x.png"));
     refused(&["render", &scene, "-o", &picture], 1, &["lost.obj", "all of its 2 faces are lost (line 7: "]);
-    assert_eq!(folder.names(), ["lost.obj"]);
+    assert_eq!(names(&folder), ["lost.obj"]);
 }
 
 #[test]
@@ -631,7 +601,7 @@ fn lines_refuses_what_it_cannot_draw() {
         refused(&[&usual[..], &["20000x0"], sheet].concat(), 1, &["20000x0"]);
     }
     refused(&["lines", "world:office?n=33", "-o", &svg], 1, &["539,055,000 triangles"]);
-    assert!(folder.names().is_empty());
+    assert!(names(&folder).is_empty());
 }
 
 #[test]
@@ -730,7 +700,7 @@ fn cull_by_planes_writes_maps_and_hides_nothing_that_is_seen() {
     let planes = visible("planes", &["--map", &map]);
     let exact = visible("exact", &[]);
     assert!(exact.iter().all(|i| planes.contains(i)) && planes.len() < 600, "{planes:?}");
-    assert_eq!(folder.names(), ["map.0000.svg", "map.0001.svg", "map.0002.svg"]);
+    assert_eq!(names(&folder), ["map.0000.svg", "map.0001.svg", "map.0002.svg"]);
     let text = fs::read_to_string(folder.0.join("map.0002.svg")).unwrap();
     assert!(text.starts_with("<svg") && text.matches("<polygon").count() > 3601, "{}", text.len());
     let margin = visible("planes", &["--margin", "0.5"]);

@@ -1,35 +1,10 @@
 //! `hither cull`: glass and holes by each method, what the report says of the settings, and what the terminal shows.
 
+mod common;
+
+use common::{Folder, done};
 use serde_json::{Value, json};
 use std::fs;
-use std::path::PathBuf;
-use std::process::{Command, Output};
-
-/// A folder of its own for a test, removed when dropped.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("hither-cull-{name}-{}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir_all(&path).unwrap();
-        Folder(path)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-/// Runs `arguments`, which must do their work.
-#[track_caller]
-fn done(arguments: &[&str]) -> Output {
-    let output = Command::new(env!("CARGO_BIN_EXE_hither")).args(arguments).output().unwrap();
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    output
-}
 
 #[track_caller]
 fn report(arguments: &[&str]) -> Value {
@@ -91,11 +66,11 @@ fn panes(folder: &Folder) -> Vec<String> {
     let colors = corners.iter().flat_map(|[x, _]| [1.0, 1.0, 1.0, 0.5 - 0.5 * x]);
     let mut buffer: Vec<u8> = positions.chain(colors).flat_map(f32::to_le_bytes).collect();
     buffer.extend([0u16, 1, 2, 0, 2, 3].into_iter().flat_map(u16::to_le_bytes));
-    fs::write(folder.0.join("panes.bin"), buffer).unwrap();
-    let path = folder.0.join("panes.gltf");
+    fs::write(folder.path("panes.bin"), buffer).unwrap();
+    let path = folder.path("panes.gltf");
     fs::write(&path, gltf.to_string()).unwrap();
     let view = ["--eye", "0,0,9", "--target", "0,0,0", "--fov", "60", "--size", "320x200"];
-    ["cull", &path.display().to_string()].iter().chain(&view).map(|a| (*a).to_owned()).collect()
+    ["cull", &path].iter().chain(&view).map(|a| (*a).to_owned()).collect()
 }
 
 #[test]
@@ -135,8 +110,7 @@ fn a_report_says_all_that_the_answer_and_its_time_depend_on() {
     for command in ["render", "lines"] {
         let threads = |n: &str| {
             let folder = Folder::new(&format!("threads-{command}-{n}"));
-            let drawing = folder.0.join(if command == "lines" { "x.svg" } else { "x.png" });
-            let drawing = drawing.display().to_string();
+            let drawing = folder.path(if command == "lines" { "x.svg" } else { "x.png" });
             let arguments = [command, "world:lecture", "--size", "64x48", "--threads", n, "-o", &drawing];
             report(&arguments)["threads"].clone()
         };

@@ -52,27 +52,40 @@ fn fan(polygon: &GuardedPolygon<()>, v: &[[f64; 4]; 3], positive: bool, window: 
     let depth_max = depths().fold(0.0, f32::max);
     let mut pieces = Pieces { faces_eye: true, ..Pieces::NONE };
     for i in 1..polygon.len - 1 {
-        let (a, mut b, mut c) = (screen[0].0, screen[i].0, screen[i + 1].0);
-        if !positive {
-            std::mem::swap(&mut b, &mut c);
-        }
-        let area =
-            i64::from(b[0] - a[0]) * i64::from(c[1] - a[1]) - i64::from(c[0] - a[0]) * i64::from(b[1] - a[1]);
-        let x = [a[0], b[0], c[0]];
-        let y = [a[1], b[1], c[1]];
-        let first = |v: [i32; 3], low: i32| ((v[0].min(v[1]).min(v[2]) + 127) >> 8).max(low);
-        let last = |v: [i32; 3], high: i32| (((v[0].max(v[1]).max(v[2]) - 128) >> 8) + 1).min(high);
-        let bounds = Rect {
-            left: first(x, window.left),
-            top: first(y, window.top),
-            right: last(x, window.right),
-            bottom: last(y, window.bottom),
-        };
-        if area > 0 && bounds.left < bounds.right && bounds.top < bounds.bottom {
+        let corners = [screen[0].0, screen[i].0, screen[i + 1].0];
+        if let Some((x, y, bounds)) = bounded(corners, positive, window) {
             pieces.fan[i - 1] = Some(ScreenTriangle { x, y, bounds, plane, depth_min, depth_max });
         }
     }
     pieces
+}
+
+/// The columns and the rows of a triangle's snapped corners, exchanged where its area is not to be `positive`; and the
+/// pixels of the window whose centres its bounding box holds. `None` where either is empty.
+pub(super) fn bounded(
+    [a, mut b, mut c]: [[i32; 2]; 3],
+    positive: bool,
+    window: Rect,
+) -> Option<([i32; 3], [i32; 3], Rect)> {
+    if !positive {
+        std::mem::swap(&mut b, &mut c);
+    }
+    let (x, y) = ([a[0], b[0], c[0]], [a[1], b[1], c[1]]);
+    let first = |v: [i32; 3], low: i32| ((v[0].min(v[1]).min(v[2]) + 127) >> 8).max(low);
+    let last = |v: [i32; 3], high: i32| (((v[0].max(v[1]).max(v[2]) - 128) >> 8) + 1).min(high);
+    let bounds = Rect {
+        left: first(x, window.left),
+        top: first(y, window.top),
+        right: last(x, window.right),
+        bottom: last(y, window.bottom),
+    };
+    let some = doubled_area([a, b, c]) > 0 && bounds.left < bounds.right && bounds.top < bounds.bottom;
+    some.then_some((x, y, bounds))
+}
+
+/// Twice the area of a triangle, 1/65536 pixel; positive if its corners run clockwise on the screen.
+pub(super) fn doubled_area([a, b, c]: [[i32; 2]; 3]) -> i64 {
+    i64::from(b[0] - a[0]) * i64::from(c[1] - a[1]) - i64::from(c[0] - a[0]) * i64::from(b[1] - a[1])
 }
 
 /// Depth over image pixel centres from D = α·X + β·Y + γ·W, which holds on the whole plane of the triangle.

@@ -1,7 +1,7 @@
 //! The pixels that a triangle covers, for what is not drawn into a target: the very pixels that it would get there, so
 //! that an edge between the two kinds is drawn once, too.
 
-use super::clip::clip;
+use super::clip::{bounded, clip, doubled_area};
 use super::guard::{GUARD_MAX, GUARD_MIN};
 use super::pyramid::Rect;
 use super::transform::ScreenFromObject;
@@ -75,31 +75,14 @@ fn snapped(corners: &[[f32; 3]; 3], at: &ScreenFromObject) -> Option<[[i32; 2]; 
     Some(all)
 }
 
-fn whole(
-    [a, mut b, mut c]: [[i32; 2]; 3],
-    at: &ScreenFromObject,
-    two_sided: bool,
-    image: Rect,
-) -> Option<Piece> {
-    let side = |k: usize, from: [i32; 2], to: [i32; 2]| i64::from(to[k] - from[k]);
-    let area = side(0, a, b) * side(1, a, c) - side(0, a, c) * side(1, a, b);
+fn whole(corners: [[i32; 2]; 3], at: &ScreenFromObject, two_sided: bool, image: Rect) -> Option<Piece> {
+    let area = doubled_area(corners);
     let is_front = (area > 0) == (at.front_sign > 0.0);
-    if area == 0 || !(is_front || two_sided) {
+    if !(is_front || two_sided) {
         return None;
     }
-    if area < 0 {
-        std::mem::swap(&mut b, &mut c);
-    }
-    let (x, y) = ([a[0], b[0], c[0]], [a[1], b[1], c[1]]);
-    let first = |v: [i32; 3], low: i32| ((v[0].min(v[1]).min(v[2]) + 127) >> 8).max(low);
-    let end = |v: [i32; 3], high: i32| (((v[0].max(v[1]).max(v[2]) - 128) >> 8) + 1).min(high);
-    let bounds = Rect {
-        left: first(x, image.left),
-        top: first(y, image.top),
-        right: end(x, image.right),
-        bottom: end(y, image.bottom),
-    };
-    (bounds.left < bounds.right && bounds.top < bounds.bottom).then_some(Piece { x, y, bounds })
+    let (x, y, bounds) = bounded(corners, area > 0, image)?;
+    Some(Piece { x, y, bounds })
 }
 
 impl Piece {

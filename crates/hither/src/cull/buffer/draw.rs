@@ -63,8 +63,6 @@ pub(in crate::cull) struct Standing<'a> {
     pub least_px: i32,
     /// Patches whose bounding boxes cover fewer pixels than this for each face are not worth drawing.
     pub px_a_face: i32,
-    /// Whether to draw the boxes inside such patches instead.
-    pub inner: bool,
     /// Draw all patches alike, face by face, as if none were loose or fine: slower, to compare with.
     pub plain: bool,
 }
@@ -564,7 +562,7 @@ fn bodies<'a>(standing: &Standing<'a>, patch: &'a Patch, open: &Open) -> Option<
     // Three faces of a box are seen.
     let faces = 3 * inner.len() as i64;
     let worth = pixels >= faces * i64::from(standing.px_a_face.max(PX_A_FACE_OF_A_BOX));
-    (whole && standing.inner && faces > 0 && worth).then_some(inner)
+    (whole && faces > 0 && worth).then_some(inner)
 }
 
 /// An orthographic depth is kept no more than that below the true one, and a share of it: see [`Placing::depth`].

@@ -361,7 +361,6 @@ impl Frame {
             size: [self.view.width as i32, self.view.height as i32],
             least_px,
             px_a_face: 0,
-            inner: true,
             plain: false,
         }
     }

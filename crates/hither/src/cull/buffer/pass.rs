@@ -6,8 +6,8 @@
 //!
 //! *Eroded by slack.* Where a corner may be off by δ, a square is covered if that which is δ wider each way is, and its
 //! depth is the least within that. So eroding by ρ is drawing with a slack of δ + ρ, which all ways to draw a patch know,
-//! as long as their numbers have room for it ([`MOST_SLACK`]). What moves more is counted first and then eroded pixel by
-//! pixel.
+//! as long as their numbers have room for it ([`MOST_SLACK`]). What moves more is counted first and then eroded by blocks of
+//! 4×4 pixels.
 
 use super::Margin;
 use super::draw::{DEPTH_IS_LESS, Open, Standing};

@@ -304,7 +304,7 @@ fn blended_triangles(scene: &Scene, view: &View) -> Vec<(SurfaceId, [DVec3; 3])>
 fn is_at_border(view: &View, at: DVec2, corners: [DVec3; 3]) -> bool {
     let here = meet_at(view, at, corners).is_some();
     let offsets =
-        (-2..=2).flat_map(|x| (-2..=2).map(move |y| DVec2::new(f64::from(x), f64::from(y)) / 256.0));
+        (-1..=1).flat_map(|x| (-1..=1).map(move |y| DVec2::new(f64::from(x), f64::from(y)) / 256.0));
     offsets.into_iter().any(|offset| meet_at(view, at + offset, corners).is_some() != here)
 }
 

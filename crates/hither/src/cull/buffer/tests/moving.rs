@@ -159,6 +159,13 @@ fn whatever_was_drawn_a_moved_eye_sees_nothing_that_it_hides() {
                 between[usize::from(!asked(&buffer, &middle))] = middle;
             }
             hidden.push(between[0]);
+            // What lies beyond an edge comes into sight where the eye goes the same way across the line of sight.
+            let [b, shown] = between.map(|b| view.view_from_world.transform_point3((b.min + b.max) * 0.5));
+            let goes = (shown - b).reject_from_normalized(b.normalize()).normalize_or_zero() * r;
+            let mut moved = view;
+            moved.view_from_world = DAffine3::from_translation(-goes) * view.view_from_world;
+            let sight = Sight::new(&scene, &moved);
+            points_are_out_of_sight(&sight, &moved, &between[0], Verdict::Hidden, random, seed);
         }
         for _ in 0..8 {
             let mut moved = view;
@@ -172,6 +179,57 @@ fn whatever_was_drawn_a_moved_eye_sees_nothing_that_it_hides() {
     });
     let [small, large] = counts.reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
     assert!(small > 2000 && large > 8000, "{small} behind what is small, {large} behind what is large");
+}
+
+/// What is only just hidden far behind the edge of a wall is so for an eye at the margin's end, however near the wall:
+/// where much is eroded, and where little is.
+#[test]
+fn an_eye_at_the_margins_end_sees_nothing_behind_a_walls_edge() {
+    let (corners, faces) = ([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)], [[0, 1, 2], [0, 2, 3]]);
+    let square = Occluder::new(&corners.map(|(x, y)| Vec3::new(x, y, 0.0)), &faces, Sides::Both).unwrap();
+    let projection = Projection::Perspective { fov_y: 2.0, near: 0.05 };
+    let view = View::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, (300, 300));
+    let (r, far, size) = (0.2, 90.0, 40.0);
+    let options = OcclusionOptions { eye_moves: r, ..OcclusionOptions::default() };
+    let mut pairs = 0;
+    for distance in [0.35, 0.5, 1.0, 2.0, 4.0] {
+        for part in [-0.6, -0.2, 0.3, 0.8] {
+            // In the direction x, and in y, of both sides of the wall.
+            for (axis, side) in [(DVec3::X, 1.0), (DVec3::X, -1.0), (DVec3::Y, 1.0), (DVec3::Y, -1.0)] {
+                let edge = part * distance * 1.5;
+                let middle = axis * (edge - side * size * 0.5) - DVec3::Z * distance;
+                let mut buffer = OcclusionBuffer::new(&view, &options).unwrap();
+                buffer.draw(
+                    &square,
+                    &(DAffine3::from_translation(middle) * DAffine3::from_scale(DVec3::splat(size))),
+                );
+                for across in [-0.9, 0.0, 0.9] {
+                    let at = |along: f64| {
+                        axis * along + DVec3::new(axis.y, axis.x, 0.0) * (across * far) - DVec3::Z * far
+                    };
+                    let hides = |along: f64| buffer.ask_box(&cube_at(at(along), 0.0)) == Verdict::Hidden;
+                    let mut between = [-side * 1.4 * far, side * 1.4 * far];
+                    if !hides(between[0]) || hides(between[1]) {
+                        continue;
+                    }
+                    for _ in 0..30 {
+                        let middle = (between[0] + between[1]) * 0.5;
+                        between[usize::from(!hides(middle))] = middle;
+                    }
+                    pairs += 1;
+                    for forward in [-0.9, -0.5, 0.0, 0.5, 0.9] {
+                        let eye =
+                            axis * (side * r * f64::sqrt(1.0 - forward * forward)) - DVec3::Z * (r * forward);
+                        let way = at(between[0]) - eye;
+                        let crossing = eye + way * ((-distance - eye.z) / way.z);
+                        let inside = (edge - crossing.dot(axis)) * side;
+                        assert!(inside >= 0.0, "{distance} m, edge at {edge}: {inside} from {eye}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(pairs > 60, "{pairs}");
 }
 
 #[test]
