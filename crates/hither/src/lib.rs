@@ -35,6 +35,7 @@ pub mod reference;
 pub mod render;
 pub mod scene;
 
+pub use fearless_simd::Level;
 pub use index::{IndexOptions, SceneIndex};
 pub use render::{Algorithm, Frame, RenderOptions, Renderer, render};
 pub use scene::Scene;

@@ -16,6 +16,7 @@ use crate::timeline::Timeline;
 use clap::ValueEnum;
 use hither::conventions::View;
 use hither::cull::{CullCounters, CullOptions, Culler, Meaning, Reason};
+use hither::scene::InstanceLocator;
 use hither::{IndexOptions, Scene, SceneIndex};
 use hither_io::one_line;
 use serde_json::{Map, Value, json};
@@ -101,6 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     timeline.pose_first(&mut scene)?;
     let eye = Eye::choose(&scene, &arguments.scene, &arguments.view, verbosity)?;
     let spinner = verbosity.spinner("indexing".into());
+    let locator = InstanceLocator::new(&scene);
     let mut index = SceneIndex::build(scene, &IndexOptions::default());
     let mut method = Method::new(arguments, &index);
     spinner.finish_and_clear();
@@ -114,10 +116,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         if let Method::Planes(planes) = &method {
             planes.write_map(number, timeline.numbered)?;
         }
-        bar.suspend(|| say(&index, &found, number, to, verbosity))?;
+        let names = Names { scene: index.scene(), locator: &locator };
+        bar.suspend(|| say(&names, &found, number, to, verbosity))?;
         bar.inc(1);
         if to.is_some() {
-            frames.push(frame_json(&index, &found, number, timeline.time(number), &view));
+            frames.push(frame_json(&names, &found, number, timeline.time(number), &view));
         }
     }
     bar.finish_and_clear();
@@ -218,13 +221,13 @@ impl Method {
 }
 
 fn say(
-    index: &SceneIndex,
+    names: &Names,
     found: &Found,
     number: u32,
     to: Option<&Path>,
     verbosity: Verbosity,
 ) -> Result<(), Failure> {
-    let all = index.scene().instance_count();
+    let all = names.scene.instance_count();
     let time = short(found.time.as_secs_f64() * 1e3);
     let seen = grouped(found.visible.len() as u64);
     let mut line = format!("frame {number}: {seen} of {} could be seen; {time} ms", count(all, "instance"));
@@ -234,7 +237,7 @@ fn say(
     let mut lines = vec![line];
     if verbosity == Verbosity::Verbose {
         lines.push(format!("  {}", counters_line(&found.counters)));
-        let named = |&i: &u32| format!("  {i} {}", one_line(&name(index.scene(), i).unwrap_or_default()));
+        let named = |&i: &u32| format!("  {i} {}", one_line(&names.of(i).unwrap_or_default()));
         lines.extend(found.visible.iter().map(named));
     }
     match to {
@@ -256,14 +259,20 @@ fn counters_line(counters: &Value) -> String {
     all.filter_map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// The names of nodes that lead to an instance.
-fn name(scene: &Scene, instance: u32) -> Option<String> {
-    scene.instance(instance.into()).map(|instance| scene.path_name(&instance.path))
+/// Says what instances are called: the names of the nodes that lead to them.
+struct Names<'a> {
+    scene: &'a Scene,
+    locator: &'a InstanceLocator,
 }
 
-fn frame_json(index: &SceneIndex, found: &Found, number: u32, time: Option<f64>, view: &View) -> Value {
-    let scene = index.scene();
-    let named = |&i: &u32| json!({ "instance": i, "name": name(scene, i) });
+impl Names<'_> {
+    fn of(&self, instance: u32) -> Option<String> {
+        self.locator.path(self.scene, instance).map(|path| self.scene.path_name(&path))
+    }
+}
+
+fn frame_json(names: &Names, found: &Found, number: u32, time: Option<f64>, view: &View) -> Value {
+    let named = |&i: &u32| json!({ "instance": i, "name": names.of(i) });
     let mut frame = json!({
         "frame": number,
         "scene_time_ms": time.map(|t| t * 1e3),

@@ -111,8 +111,12 @@ impl Job<'_> {
             let view = self.eye.view(index.scene(), &self.arguments.scene, self.arguments.view.size)?;
             let start = Instant::now();
             let frame = renderer.render(index, &view, &options).map_err(|e| Failure::work(e.to_string()))?;
-            let render_time = start.elapsed();
-            let file = self.write(&mut shader, index.scene(), &frame, number)?;
+            let mut render_time = start.elapsed();
+            let written = self.write(&mut shader, index.scene(), &frame, number)?;
+            let file = written.map(|(file, composing)| {
+                render_time += composing;
+                file
+            });
             let seen = if self.wants_counts { Seen::count(&frame) } else { Seen::default() };
             bar.suspend(|| {
                 verbosity.detail(&frame_line(&frame, &seen, number, render_time));
@@ -136,28 +140,27 @@ impl Job<'_> {
         Ok(reports)
     }
 
-    /// Shades and writes a frame, if a picture is asked for; returns its file.
+    /// Shades and writes a frame, if a picture is asked for; returns its file, and the time that its layers took.
     fn write(
         &self,
         shader: &mut Shader,
         scene: &Scene,
         frame: &Frame,
         number: u32,
-    ) -> Result<Option<PathBuf>, Failure> {
+    ) -> Result<Option<(PathBuf, Duration)>, Failure> {
         let (Some(output), Some(format)) = (&self.arguments.output, self.format) else { return Ok(None) };
         let path = if self.timeline.numbered { outputs::numbered(output, number) } else { output.clone() };
         let panel = self.arguments.shade.panel().and_then(|panel| complexity_image(frame, panel));
         let shading = self.arguments.shade.shading();
+        let in_layers = self.arguments.work.algorithm == AlgorithmName::Layers && shading.shows_blended();
+        let mut composing = Duration::ZERO;
         let mut image = match panel {
             Some(panel) => panel,
-            None if self.arguments.work.algorithm == AlgorithmName::Layers && shading.shows_blended() => {
-                layered::picture(
-                    scene,
-                    &self.arguments.scene,
-                    frame,
-                    shading,
-                    self.arguments.report.verbosity(),
-                )?
+            None if in_layers => {
+                let (start, verbosity) = (Instant::now(), self.arguments.report.verbosity());
+                let image = layered::picture(scene, &self.arguments.scene, frame, shading, verbosity)?;
+                composing = start.elapsed();
+                image
             }
             None => shader.shade(scene, frame, shading),
         };
@@ -168,7 +171,7 @@ impl Job<'_> {
             PictureFormat::Png => hither_io::write_png(&path, image.width, image.height, &image.pixels)?,
             PictureFormat::Exr => write_exr(&path, &image, frame)?,
         }
-        Ok(Some(path))
+        Ok(Some((path, composing)))
     }
 
     fn settings(&self, scene: &Scene) -> serde_json::Map<String, Value> {

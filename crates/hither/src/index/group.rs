@@ -177,6 +177,7 @@ impl GroupIndex {
             let off = motion.movers.iter().filter(|&&i| is_off(i)).map(|&i| (self.places[i as usize], i));
             let off = off.map(|(place, i)| (place.node, place.slot, Box3::EMPTY, i));
             motion.refit.set(&mut self.moving, off);
+            motion.refit.settle();
         }
         moved.len()
     }

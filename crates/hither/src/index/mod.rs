@@ -19,7 +19,7 @@ pub(crate) use group::{GroupIndex, Item};
 pub(crate) use mesh::{BlockTree, MeshIndex};
 pub(crate) use tree::{Box3, Child, Slot, WideNode, WideTree};
 
-use crate::scene::{Content, Scene, Transform};
+use crate::scene::{Content, HidingMaterials, Scene, Transform};
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -63,8 +63,9 @@ pub struct SceneIndex {
 impl SceneIndex {
     /// Builds the trees. The scene must be valid ([`Scene::validate`]). Cost: n log n in stored triangles.
     pub fn build(scene: Scene, options: &IndexOptions) -> SceneIndex {
-        let meshes: Vec<MeshIndex> =
-            scene.meshes.par_iter().map(|mesh| MeshIndex::build(mesh, &scene.materials, options)).collect();
+        let materials = HidingMaterials::new(&scene);
+        let build = |mesh| MeshIndex::build(mesh, materials.of(mesh), options);
+        let meshes: Vec<MeshIndex> = scene.meshes.par_iter().map(build).collect();
         let counts = scene.instance_counts();
         let mut groups: Vec<GroupIndex> = Vec::with_capacity(scene.groups.len());
         for group in &scene.groups {
@@ -121,7 +122,7 @@ impl SceneIndex {
     /// Poses the scene at `time` seconds of animation `animation` and refits what moved; static parts are
     /// untouched. Returns the number of root-group nodes with content that moved. Cost: the animation's
     /// channels, the nodes below those that they move, and the boxes above; the first time, all nodes of the
-    /// root group.
+    /// root group; where a node moves that never did, the tree of all that ever did.
     pub fn pose(&mut self, animation: usize, time: f64) -> usize {
         let Some(channels) = self.scene.animations.get(animation).map(|a| &a.channels) else { return 0 };
         let mut changed: Vec<u32> = channels.iter().map(|channel| channel.node).collect();
@@ -148,8 +149,21 @@ impl SceneIndex {
     /// Switches a node of the root group off, with what hangs from it, or on again, wherever it is then. What is off
     /// shows nothing, hides nothing and is in no answer; its numbers stay. Returns how many nodes with content it
     /// concerned. Cost: as of [`SceneIndex::pose`].
+    ///
+    /// In [`SceneIndex::scene`] a node that is off is a point at the origin, and so is what hangs from it, cameras too;
+    /// [`SceneIndex::into_scene`] has it where it would be.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such node.
     pub fn set_shown(&mut self, node: u32, shown: bool) -> usize {
-        let local = &mut self.scene.groups[self.scene.root as usize].nodes[node as usize].local;
+        let nodes = &mut self.scene.groups[self.scene.root as usize].nodes;
+        assert!(
+            (node as usize) < nodes.len(),
+            "the root group has {} nodes, and no node {node}",
+            nodes.len()
+        );
+        let local = &mut nodes[node as usize].local;
         match (shown, self.switched_off.remove(&node)) {
             (true, None) => return 0,
             (true, Some(stored)) => *local = stored,
@@ -163,13 +177,29 @@ impl SceneIndex {
 
     /// Moves one node of the root group; returns how many nodes with content moved with it. Cost: as of
     /// [`SceneIndex::pose`].
+    ///
+    /// # Panics
+    ///
+    /// If there is no such node.
     pub fn set_transform(&mut self, node: u32, local: Transform) -> usize {
         self.set_transforms([(node, local)])
     }
 
     /// Moves several nodes of the root group at once. Cost: as of [`SceneIndex::pose`], once instead of a node.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such node; nothing has moved then.
     pub fn set_transforms(&mut self, moves: impl IntoIterator<Item = (u32, Transform)>) -> usize {
+        let moves: Vec<_> = moves.into_iter().collect();
         let nodes = &mut self.scene.groups[self.scene.root as usize].nodes;
+        for (node, _) in &moves {
+            assert!(
+                (*node as usize) < nodes.len(),
+                "the root group has {} nodes, and no node {node}",
+                nodes.len()
+            );
+        }
         let place = |(node, local): (u32, Transform)| {
             match self.switched_off.get_mut(&node) {
                 Some(stored) => *stored = local,

@@ -13,27 +13,43 @@ pub(super) struct Refit {
     built_area: f64,
 }
 
-/// A tree is worth rebuilding once its boxes have this many times the surface they were built with.
+/// A tree is worth rebuilding once its boxes have this many times the surface they were built with, or were built with
+/// this many times what they have.
 const LOOSE: f64 = 1.5;
+
+/// A box so large, square metres, is around something that is nowhere, and says nothing of how well the others lie.
+const NOWHERE: f64 = 1e30;
+
+/// Half the surface of a box, where it counts.
+fn area(bounds: &Box3) -> f64 {
+    let area = if bounds.is_empty() { 0.0 } else { bounds.half_area() };
+    if area < NOWHERE { area } else { 0.0 }
+}
 
 impl Refit {
     pub fn new(tree: &WideTree) -> Refit {
         let mut above = vec![(0, 0); tree.nodes.len()];
-        let mut area = 0.0;
+        let mut sum = 0.0;
         for (n, node) in tree.nodes.iter().enumerate() {
             for slot in (0..node.used as usize).filter(|&s| node.child[s] != Slot::EMPTY) {
-                area += node.bounds_of(slot).half_area();
+                sum += area(&node.bounds_of(slot));
                 if let Child::Node(child) = node.child[slot].child() {
                     above[child as usize] = (n as u32, slot as u32);
                 }
             }
         }
-        Refit { above, area, built_area: area }
+        Refit { above, area: sum, built_area: sum }
     }
 
-    /// Whether the boxes have grown so much that the tree should be built anew.
+    /// Whether the boxes have grown so much, or shrunk, that the tree should be built anew. What shrinks was built around
+    /// something that has gone, and a sum that it went from is no longer known well.
     pub fn is_loose(&self) -> bool {
-        self.area > LOOSE * self.built_area
+        !(self.area <= LOOSE * self.built_area && self.area * LOOSE >= self.built_area)
+    }
+
+    /// Takes the boxes as they are now for those that the tree was built with.
+    pub fn settle(&mut self) {
+        self.built_area = self.area;
     }
 
     /// Gives leaves new boxes: (node, slot, box, leaf). One with an empty box becomes vacant until it gets another.
@@ -65,7 +81,6 @@ impl Refit {
 
     fn set_slot(&mut self, tree: &mut WideTree, (node, slot): (u32, u32), bounds: &Box3, child: Slot) {
         let node = &mut tree.nodes[node as usize];
-        let area = |b: &Box3| if b.is_empty() { 0.0 } else { b.half_area() };
         self.area += area(bounds) - area(&node.bounds_of(slot as usize));
         node.set(slot as usize, bounds, child);
     }

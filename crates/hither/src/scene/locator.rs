@@ -1,6 +1,6 @@
 //! Finds an instance by its number in a few steps, without expanding the others.
 
-use super::{Content, Scene};
+use super::{Content, Group, Scene};
 use glam::DAffine3;
 
 /// For each group, where the instances of each of its nodes begin. Independent of how the scene is posed.
@@ -45,20 +45,33 @@ impl InstanceLocator {
     /// transform is that of [`Scene::instances`] to the last bit. Cost: nesting depth × logarithm of nodes,
     /// and the node's ancestors in each group.
     pub fn locate(&self, scene: &Scene, index: u32) -> Option<(u32, DAffine3)> {
-        let mut group = scene.root as usize;
-        let mut rest = index;
         let mut world = DAffine3::IDENTITY;
+        let mesh = self.descend(scene, index, |group, node| world *= group.world_transform(node as usize))?;
+        Some((mesh, world))
+    }
+
+    /// The nodes that lead to instance `index`, one in each nested group: the path of [`Scene::instance`], as
+    /// [`Scene::path_name`] takes it. Cost: nesting depth × logarithm of nodes.
+    pub fn path(&self, scene: &Scene, index: u32) -> Option<Vec<u32>> {
+        let mut path = Vec::new();
+        self.descend(scene, index, |_, node| path.push(node))?;
+        Some(path)
+    }
+
+    /// Shows each group on the way to instance `index`, and its node that leads on. Returns the mesh.
+    fn descend(&self, scene: &Scene, index: u32, mut through: impl FnMut(&Group, u32)) -> Option<u32> {
+        let (mut group, mut rest) = (scene.root as usize, index);
         loop {
             let starts = &self.groups[group];
             if rest >= starts.total {
                 return None;
             }
             let at = starts.first.partition_point(|&first| first <= rest) - 1;
-            let node = starts.nodes[at] as usize;
+            let node = starts.nodes[at];
             rest -= starts.first[at];
-            world *= scene.groups[group].world_transform(node);
-            match scene.groups[group].nodes[node].content {
-                Content::Mesh(mesh) => return Some((mesh, world)),
+            through(&scene.groups[group], node);
+            match scene.groups[group].nodes[node as usize].content {
+                Content::Mesh(mesh) => return Some(mesh),
                 Content::Group(inner) => group = inner as usize,
                 Content::Nothing => unreachable!("only nodes that show something are listed"),
             }
@@ -69,7 +82,7 @@ impl InstanceLocator {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Group, Mesh, Node, Transform};
+    use crate::scene::{Mesh, Node, Transform};
     use glam::{DQuat, DVec3};
     use proptest::prelude::*;
 
@@ -114,6 +127,7 @@ mod tests {
             for (i, instance) in all.iter().enumerate() {
                 let found = locator.locate(&scene, i as u32);
                 prop_assert_eq!(found, Some((instance.mesh, instance.world_from_mesh)));
+                prop_assert_eq!(locator.path(&scene, i as u32), Some(instance.path.clone()));
             }
             prop_assert!(locator.locate(&scene, all.len() as u32).is_none());
             prop_assert!(locator.locate(&scene, u32::MAX).is_none());

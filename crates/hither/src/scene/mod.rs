@@ -9,6 +9,7 @@
 
 mod animation;
 mod camera;
+mod hiding;
 mod locator;
 mod material;
 mod mesh;
@@ -18,6 +19,7 @@ mod sample;
 
 pub use animation::{Animation, Channel, Interpolation, Property};
 pub use camera::{Camera, CameraProjection};
+pub(crate) use hiding::HidingMaterials;
 pub use locator::InstanceLocator;
 pub use material::{AlphaMode, Filter, Material, Texture, TextureRef, Wrap};
 pub use mesh::{Mesh, Primitive};

@@ -107,7 +107,13 @@ impl ConvexBody {
             let normal = DVec3::new(x, y, z);
             // Coordinates in f32 bound how well the plane is known.
             let slack = size * ROUGHLY + d.abs() * 1e-6;
-            normal != DVec3::ZERO && points.iter().all(|p| normal.dot(*p) - d <= slack)
+            let (mut behind, mut in_front) = (0.0f64, 0.0f64);
+            for p in &points {
+                let side = normal.dot(*p) - d;
+                (behind, in_front) = (behind.min(side), in_front.max(side));
+            }
+            // Something flat has no body: its outline may be anything.
+            normal != DVec3::ZERO && in_front <= slack && behind < -slack
         })
     }
 }

@@ -4,9 +4,11 @@ use super::ask::{BoxView, BoxesOnScreen, project_lanes};
 use super::clip::{self, Clipped, EdgeOf, clip, doubled_area};
 use super::convex::{self, Bounds};
 use super::fill::{Corner, Goes, Joint, Outline, fill, first_pixel, last_pixel};
+use super::fine::FinePatch;
 use super::loose::{LooseFaces, Sixteen, fill_one, set_up};
-use super::mosaic::{Area, Drawing, Mosaic};
+use super::mosaic::{Area, Drawing, MOST_EDGES, Mosaic};
 use super::occluder::{ENDS, Face, Occluder, Patch};
+use super::parts::{Apart, Parts};
 use super::pass::Pass;
 use super::place::{Placed, Placing, Sizes};
 use super::surface::Surface;
@@ -30,6 +32,7 @@ pub(in crate::cull) struct Band {
     beyond: Vec<u8>,
     loose: Box<Sixteen>,
     mosaic: Mosaic,
+    parts: Parts,
     bounds: Bounds,
     /// The children of a node.
     boxes: Box<BoxesOnScreen>,
@@ -81,6 +84,7 @@ impl Band {
             beyond: vec![],
             loose: Box::default(),
             mosaic: Mosaic::default(),
+            parts: Parts::default(),
             bounds: Bounds::default(),
             boxes: Box::new(BoxesOnScreen::NONE),
             open: NearestFirst::new(),
@@ -264,27 +268,25 @@ impl Band {
         if !bodies.is_empty() {
             return;
         }
+        let faces = &standing.occluder.faces[patch.first_face as usize..][..patch.faces as usize];
         if let (false, Some(fine)) = (plain, &patch.fine)
             && is_fine(rect, patch.faces as usize, PX_A_FINE_FACE)
             && let Some(rect) = self.rows_of(rect)
         {
             let fine = standing.occluder.fine.get(fine, patch.faces);
             placing.place(simd, &standing.occluder.vertices, patch, &mut self.placed);
-            let drawing = Drawing {
-                patch: fine,
-                placed: &self.placed,
-                eye: standing.eye,
-                front_sign: standing.at.front_sign as i32,
-                slack: placing.slack,
-                rect,
-            };
-            if let Some(faces) = self.mosaic.draw(simd, &mut self.surface, &drawing) {
-                drawn.patches += 1;
-                drawn.faces += faces;
+            self.mosaic.take_turns(simd, &fine, standing.eye);
+            if self.draw_fine(
+                simd,
+                standing,
+                faces,
+                fine,
+                (apart(standing, patch, pass), placing.slack, rect),
+                drawn,
+            ) {
                 return;
             }
         }
-        let faces = &standing.occluder.faces[patch.first_face as usize..][..patch.faces as usize];
         self.clipped.clear();
         if clear {
             self.placed_turns(simd, standing, patch, &placing, faces);
@@ -296,17 +298,90 @@ impl Band {
         drawn.patches += 1;
         let count = self.turns.iter().filter(|turn| **turn != 0).count();
         drawn.faces += count as u64;
-        if !(clear || standing.plain || jointly) {
-            let rect = self.around_clipped(faces, placing.slack, standing.size);
-            if is_fine(rect, count, PX_A_CLIPPED_FACE) {
-                if let Some(rect) = self.rows_of(rect) {
-                    self.clipped_mosaic(simd, faces, rect, placing.slack);
-                }
+        let by_outline = !(clear || standing.plain || jointly)
+            && is_fine(self.around_clipped(faces, placing.slack, standing.size), count, PX_A_CLIPPED_FACE);
+        // Faces that are filled one by one have depths of their own.
+        let may = by_outline || jointly || (standing.plain && patch.fine.is_some());
+        let apart = if may { apart(standing, patch, pass) } else { Apart::Not };
+        let parts = self.take_apart(faces, apart, false);
+        for part in 0..parts {
+            if parts > 1 {
+                self.parts.choose(part, &mut self.turns);
+            }
+            self.draw_turned(simd, standing, faces, placing.slack, by_outline, margin_px);
+        }
+    }
+
+    /// Draws a patch whose corners are placed and whose turns the mosaic has. False if it must be drawn in another way.
+    #[inline(always)]
+    fn draw_fine<S: Simd>(
+        &mut self,
+        simd: S,
+        standing: &Standing,
+        faces: &[Face],
+        fine: FinePatch,
+        (apart, slack, rect): (Apart, i32, [i32; 4]),
+        drawn: &mut Drawn,
+    ) -> bool {
+        let front_sign = standing.at.front_sign as i32;
+        let parts = self.take_apart(faces, apart, true);
+        for part in 0..parts {
+            if parts > 1 {
+                self.parts.choose(part, self.mosaic.turns());
+            }
+            let drawing = Drawing { patch: fine, placed: &self.placed, front_sign, slack, rect };
+            let Some(faces) = self.mosaic.draw(simd, &mut self.surface, &drawing) else { return false };
+            drawn.faces += faces;
+        }
+        drawn.patches += 1;
+        true
+    }
+
+    /// Takes a patch whose turns are known apart, where that may pay. Returns how many parts there are.
+    #[inline(always)]
+    fn take_apart(&mut self, faces: &[Face], apart: Apart, fine: bool) -> usize {
+        match apart {
+            Apart::Not => 1,
+            _ => self.find_parts(faces, apart, fine),
+        }
+    }
+
+    #[inline(never)]
+    fn find_parts(&mut self, faces: &[Face], apart: Apart, fine: bool) -> usize {
+        let turns = if fine { &*self.mosaic.turns() } else { &self.turns };
+        let parts = self.parts.find(faces, turns);
+        if parts > 1 || apart != Apart::ByDepth {
+            return parts;
+        }
+        let placed = &self.placed;
+        self.parts.find_near(|f| {
+            let [a, b, c, d] = placed.corners(&faces[f].corner).map(|c| c.depth);
+            let least = a.min(b).min(c.min(d));
+            // Of a corner that was not placed, for it is clipped.
+            if least == 0.0 { f32::INFINITY } else { least }
+        })
+    }
+
+    /// Draws the faces of a patch that have a turn, placed or clipped.
+    #[inline(always)]
+    fn draw_turned<S: Simd>(
+        &mut self,
+        simd: S,
+        standing: &Standing,
+        faces: &[Face],
+        slack: i32,
+        by_outline: bool,
+        margin_px: i32,
+    ) {
+        if by_outline {
+            let rect = self.around_clipped(faces, slack, standing.size);
+            let Some(rect) = self.rows_of(rect) else { return };
+            if self.clipped_mosaic(simd, faces, rect, slack) {
                 return;
             }
         }
         let goes = if margin_px > 0 { Goes::Jointly } else { Goes::Apart };
-        self.fill_faces(simd, faces, placing.slack, goes);
+        self.fill_faces(simd, faces, slack, goes);
         if margin_px > 0 {
             self.joint.finish_eroded(simd, &mut self.surface, self.placed.nearest, margin_px);
         } else {
@@ -351,9 +426,8 @@ impl Band {
             if self.turns[f] == 0 {
                 continue;
             }
-            match self.clipped.get(next) {
-                Some((number, pieces)) if *number == f as u32 => {
-                    next += 1;
+            match pieces_of(&self.clipped, &mut next, f) {
+                Some(pieces) => {
                     let corners = pieces.iter().flatten().flat_map(|piece| &piece.corner[..piece.len]);
                     corners.for_each(|(corner, _)| take(corner));
                 }
@@ -371,11 +445,19 @@ impl Band {
         ]
     }
 
-    /// Draws a patch, whose turns are known and whose corners are placed or clipped, by its outline.
+    /// Draws a patch, whose turns are known and whose corners are placed or clipped, by its outline. False if that is too
+    /// long.
     #[inline(always)]
-    fn clipped_mosaic<S: Simd>(&mut self, simd: S, faces: &[Face], rect: [i32; 4], slack: i32) {
+    fn clipped_mosaic<S: Simd>(&mut self, simd: S, faces: &[Face], rect: [i32; 4], slack: i32) -> bool {
         if rect[0] > rect[2] {
-            return;
+            return true;
+        }
+        let ends = |(f, face): (usize, &Face)| match self.turns[f] {
+            0 => 0,
+            _ => ends_of(face, f, &self.turns).count_ones() as usize,
+        };
+        if faces.len() * 4 > MOST_EDGES && faces.iter().enumerate().map(ends).sum::<usize>() > MOST_EDGES {
+            return false;
         }
         let area = self.mosaic.begin(&self.surface, rect, slack);
         let mut next = 0;
@@ -385,16 +467,14 @@ impl Band {
                 continue;
             }
             let (ends, count) = (ends_of(face, f, &self.turns), usize::from(face.corners));
-            if self.clipped.get(next).is_none_or(|c| c.0 != f as u32) {
+            let Some(pieces) = pieces_of(&self.clipped, &mut next, f) else {
                 let corner = self.placed.corners(&face.corner);
                 self.face_of_mosaic(simd, &area, Outline { corner, corners: count, turn, ends: ALL }, slack);
                 for k in (0..count).filter(|k| ends >> k & 1 == 1) {
                     self.mosaic.edge(&corner[k], &corner[(k + 1) % count], turn);
                 }
                 continue;
-            }
-            let pieces = self.clipped[next].1;
-            next += 1;
+            };
             for (p, piece) in pieces.iter().enumerate() {
                 let Some(piece) = piece else { continue };
                 let ends = if count == 3 { ends } else { ends_of_half(ends, p, pieces[1 - p].is_none()) };
@@ -407,8 +487,7 @@ impl Band {
                 }
             }
         }
-        // If its outline is too long, its large faces have to do.
-        self.mosaic.end(simd, &mut self.surface, &area, self.placed.nearest);
+        self.mosaic.end(simd, &mut self.surface, &area, self.placed.nearest)
     }
 
     /// Takes a face for the mosaic. A large one is filled by itself, too: where it covers whole blocks, what is farther
@@ -441,13 +520,11 @@ impl Band {
             }
             let ends = ends_of(face, f, &self.turns);
             let corner = self.placed.corners(&face.corner);
-            if self.clipped.get(next).is_none_or(|c| c.0 != f as u32) {
+            let Some(pieces) = pieces_of(&self.clipped, &mut next, f) else {
                 let outline = Outline { corner, corners: usize::from(face.corners), turn, ends };
                 fill(simd, surface, joint, &outline, slack, nearest, goes);
                 continue;
-            }
-            let pieces = self.clipped[next].1;
-            next += 1;
+            };
             for (p, piece) in pieces.iter().enumerate() {
                 let Some(piece) = piece else { continue };
                 let ends =
@@ -538,8 +615,34 @@ impl Band {
     }
 }
 
+/// How far a patch may be taken apart, by where it lies on all of the image.
+#[inline(always)]
+fn apart(standing: &Standing, patch: &Patch, pass: &Pass) -> Apart {
+    let Open { depth, farthest, rect, .. } = pass.open;
+    let image = i64::from(standing.size[0]) * i64::from(standing.size[1]);
+    Apart::of(patch.folds, patch.faces, [farthest, depth], area_of(rect), image)
+}
+
+/// The pieces of face `f`, if it was clipped; `next` is the first not yet passed.
+#[inline(always)]
+fn pieces_of(
+    clipped: &[(u32, [Option<Clipped>; 2])],
+    next: &mut usize,
+    f: usize,
+) -> Option<[Option<Clipped>; 2]> {
+    while clipped.get(*next).is_some_and(|c| (c.0 as usize) < f) {
+        *next += 1;
+    }
+    clipped.get(*next).filter(|c| c.0 as usize == f).map(|c| c.1)
+}
+
 /// So many faces of a convex body take as long as one that is drawn by itself, more or less.
 const FACES_OF_A_BODY_FOR_ONE: i64 = 16;
+
+/// Of what has this share of the image around it, or more, so many times as many faces are worth drawing: it may be the one
+/// thing that hides all the rest, a hillside, say, as it was scanned.
+const LARGE: i64 = 4;
+const FACES_OF_A_LARGE_ONE: i64 = 8;
 
 /// Smaller boxes hide too little for what it takes to place them.
 const PX_A_FACE_OF_A_BOX: i32 = 32;
@@ -550,12 +653,18 @@ const PX_A_FACE_OF_A_BOX: i32 = 32;
 fn bodies<'a>(standing: &Standing<'a>, patch: &'a Patch, open: &Open) -> Option<&'a [Patch]> {
     let pixels = area_of(open.rect);
     let wanted = i64::from(patch.faces) * i64::from(standing.px_a_face);
+    let image = i64::from(standing.size[0]) * i64::from(standing.size[1]);
+    let least = if pixels * LARGE >= image && patch.inner.is_empty() {
+        wanted / FACES_OF_A_LARGE_ONE
+    } else {
+        wanted
+    };
     // Bodies are drawn whole, beyond the near plane of every eye that may come. It is outside of the bounding box, then.
     let whole = open.clear && !standing.plain && standing.erosion(open.depth).is_some();
     if whole && patch.convex.is_some() && pixels * FACES_OF_A_BODY_FOR_ONE >= wanted {
         return Some(std::slice::from_ref(patch));
     }
-    if pixels >= wanted {
+    if pixels >= least {
         return Some(&[]);
     }
     let inner = &standing.occluder.inner[patch.inner.start as usize..patch.inner.end as usize];

@@ -57,6 +57,9 @@
 //! shared edges cross are counted (`fill`). In both, whole blocks that are covered raise one number, and only what is
 //! covered in part raises pixels.
 //!
+//! Any choice of a patch's faces is a chain, with an outline of its own. A patch that lies before itself is drawn in
+//! such parts (`parts`), lest what is near hide only at the depth of what is behind it.
+//!
 //! The names in brackets are of the files that draw so.
 //!
 //! What of a closed patch is not worth drawing may still hide by boxes that lie inside of it (`inner`): from outside
@@ -102,6 +105,7 @@ mod loose;
 mod mosaic;
 mod occludee;
 mod occluder;
+mod parts;
 mod pass;
 mod place;
 mod queries;
@@ -319,8 +323,10 @@ impl Frame {
         if self.meaning == Meaning::Sampled {
             return Err(ViewError::Camera("what is sampled needs the view's own pixels, not coarser ones"));
         }
-        let beyond = border.saturating_mul(n);
-        self.pixels_a_metre = pixels_a_metre(&self.view, beyond.saturating_add(n - 1)) / f64::from(n);
+        // Larger ones than any image hold no more of it; so the border's pixels are a number.
+        let n = n.min(LARGEST_PIXEL);
+        let beyond = border * n;
+        self.pixels_a_metre = pixels_a_metre(&self.view, beyond + (n - 1)) / f64::from(n);
         self.screen_from_world = ScreenFromObject::of_view_with_border(&self.view, beyond);
         // Rounded once more where n is no power of two: 2⁻⁵³ of each term, as any matrix on the way here.
         for row in [&mut self.screen_from_world.x, &mut self.screen_from_world.y] {
@@ -369,6 +375,9 @@ impl Frame {
 /// Pixels on each side of an image with a margin. What is cut by the image's border and so far away that it moves by no
 /// more can be hidden.
 const BORDER: u32 = 32;
+
+/// No image is wider or higher.
+const LARGEST_PIXEL: u32 = 1 << 16;
 
 /// Pixels that a metre at distance 1 covers anywhere in an image that goes on for `beyond` pixels at the right and at
 /// the bottom.

@@ -59,8 +59,6 @@ pub(super) fn eye_in_object(at: &ScreenFromObject) -> [f32; 4] {
 pub(super) struct Drawing<'a> {
     pub patch: FinePatch<'a>,
     pub placed: &'a Placed,
-    /// [`eye_in_object`].
-    pub eye: [f32; 4],
     /// Sign of the area of faces that are seen from the front.
     pub front_sign: i32,
     /// How far a corner may be from its true place, 1/256 pixel.
@@ -117,7 +115,7 @@ impl Area {
 }
 
 /// A patch with more edges in its outline is not drawn in this way: counts might not fit.
-const MOST_EDGES: usize = 10_000;
+pub(super) const MOST_EDGES: usize = 10_000;
 
 /// A face that touches no more pixels each way has its farthest corner for a plane: it is as good a bound.
 const FEW_PX: i32 = 3;
@@ -136,12 +134,16 @@ fn plane_of<S: Simd>(corners: [i32x4<S>; 4], four: bool, slack: i32) -> [f64; 3]
 const NO_DEPTH: i32 = i32::MAX;
 
 impl Mosaic {
-    /// Draws a patch. Returns how many faces were drawn; nothing, if its outline is too long.
+    /// The turns of the patch whose were found last. What is not to be drawn may be set to 0.
+    pub fn turns(&mut self) -> &mut [i8] {
+        &mut self.turn
+    }
+
+    /// Draws the faces of a patch that have a turn. Returns how many there are; nothing, if their outline is too long.
     #[inline(always)]
     pub fn draw<S: Simd>(&mut self, simd: S, surface: &mut Surface, drawing: &Drawing) -> Option<u64> {
-        let &Drawing { patch, placed, eye, front_sign, slack, rect } = drawing;
+        let &Drawing { patch, placed, front_sign, slack, rect } = drawing;
         let area = self.begin(surface, rect, slack);
-        self.take_turns(simd, &patch, eye);
         let drawn = self.lower_depths(simd, &area, &patch, placed, front_sign);
         self.end(simd, surface, &area, placed.nearest).then_some(drawn)
     }
@@ -187,8 +189,9 @@ impl Mosaic {
         fits
     }
 
+    /// Finds which faces of a patch turn to the eye.
     #[inline(always)]
-    fn take_turns<S: Simd>(&mut self, simd: S, patch: &FinePatch, eye: [f32; 4]) {
+    pub fn take_turns<S: Simd>(&mut self, simd: S, patch: &FinePatch, eye: [f32; 4]) {
         let faces = patch.face.len();
         self.turn.clear();
         self.turn.resize(faces + 1, 0);

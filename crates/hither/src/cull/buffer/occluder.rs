@@ -16,6 +16,7 @@ use super::convex::ConvexBody;
 use super::fine::{Fine, FineFaces};
 use super::inner::inner_boxes;
 use super::loose::LooseFaces;
+use super::parts::folds;
 use crate::index::{Box3, WideTree, tree_of_boxes};
 use crate::scene::{AlphaMode, Material, Mesh};
 use glam::{DVec3, Vec3};
@@ -88,6 +89,8 @@ pub(super) struct Patch {
     pub convex: Option<u32>,
     /// The boxes inside of it.
     pub inner: Range<u32>,
+    /// Whether some of it may lie before other parts of it.
+    pub folds: bool,
 }
 
 /// A triangle, or two that share the edge from corner 0 to corner 2.
@@ -371,6 +374,8 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
             ),
             convex,
             inner: 0..0,
+            folds: convex.is_none()
+                && folds(&occluder.faces[first_face as usize..], &occluder.vertices, first_vertex),
         });
         boxes.push(bounds);
     }
@@ -408,8 +413,10 @@ fn add_inner_boxes(occluder: &mut Occluder) {
                 occluder.convex.push(body);
                 let convex = Some(occluder.convex.len() as u32 - 1);
                 let (first_face, faces, fine) = (0, 0, None);
-                let inner = 0..0;
-                let box_patch = Patch { first_vertex, vertices: 8, first_face, faces, fine, convex, inner };
+                let (inner, folds) = (0..0, false);
+                let vertices = 8;
+                let box_patch =
+                    Patch { first_vertex, vertices, first_face, faces, fine, convex, inner, folds };
                 occluder.inner.push(box_patch);
             }
         }

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 mod asked;
 mod far;
 mod moving;
+mod parts;
 mod sampled;
 mod shared;
 

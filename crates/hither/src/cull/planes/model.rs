@@ -6,7 +6,7 @@
 
 use super::merge::{Cell, merge};
 use crate::geometry::Aabb;
-use crate::scene::{AlphaMode, Mesh, Scene};
+use crate::scene::{AlphaMode, HidingMaterials, Material, Mesh, Scene};
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -46,9 +46,10 @@ impl PolygonModel {
     pub fn new(scene: &Scene) -> PolygonModel {
         let mut model = PolygonModel::default();
         let mut welded = HashMap::new();
+        let materials = HidingMaterials::new(scene);
         for (number, instance) in scene.instances().iter().enumerate() {
             let mesh = &scene.meshes[instance.mesh as usize];
-            model.add(scene, mesh, number as u32, &instance.world_from_mesh, &mut welded);
+            model.add(materials.of(mesh), mesh, number as u32, &instance.world_from_mesh, &mut welded);
         }
         model
     }
@@ -85,7 +86,7 @@ impl PolygonModel {
 
     fn add(
         &mut self,
-        scene: &Scene,
+        materials: &[Material],
         mesh: &Mesh,
         instance: u32,
         world_from_mesh: &DAffine3,
@@ -97,7 +98,7 @@ impl PolygonModel {
         let mirrored = world_from_mesh.matrix3.determinant() < 0.0;
         let triangles: Vec<[u32; 3]> =
             mesh.triangles.iter().map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] }).collect();
-        let looks: Vec<u64> = (0..triangles.len() as u32).map(|t| look(scene, mesh, t)).collect();
+        let looks: Vec<u64> = (0..triangles.len() as u32).map(|t| look(materials, mesh, t)).collect();
         let (mut cells, mut cell_triangle, mut alone) = (Vec::new(), Vec::new(), Vec::new());
         for (t, corners) in triangles.iter().enumerate() {
             match normal(corners.map(|v| points[v as usize])) {
@@ -155,8 +156,8 @@ const DOUBLE_SIDED: u64 = 1;
 const OPAQUE: u64 = 2;
 
 /// What of a triangle's material decides what it hides.
-fn look(scene: &Scene, mesh: &Mesh, triangle: u32) -> u64 {
-    let material = mesh.material_of(triangle).map(|m| &scene.materials[m as usize]);
+fn look(materials: &[Material], mesh: &Mesh, triangle: u32) -> u64 {
+    let material = mesh.material_of(triangle).map(|m| &materials[m as usize]);
     let opaque = material.is_none_or(|m| m.alpha == AlphaMode::Opaque);
     let double_sided = material.is_some_and(|m| m.double_sided);
     u64::from(double_sided) * DOUBLE_SIDED + u64::from(opaque) * OPAQUE

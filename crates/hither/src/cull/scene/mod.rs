@@ -16,8 +16,8 @@
 //! *Occluders* are chosen by size on the screen: an instance is drawn if its box covers so many pixels, and of
 //! its surface the pieces that are large enough. With coherence each box that is found hidden counts for who was
 //! drawn last in its middle, and an occluder of many faces that little counted for is not tried again for some
-//! frames. A view that jumps begins anew: what hid nothing from there may hide everything from here. Masked and
-//! transparent surfaces never hide. Nothing is kept of where an occluder is, so one that moves or is switched off
+//! frames. A view that jumps begins anew: what hid nothing from there may hide everything from here. Transparent
+//! surfaces never hide, and masked ones only where the mask cannot have a hole. Nothing is kept of where an occluder is, so one that moves or is switched off
 //! costs nothing but its place in the index.
 //!
 //! The verdicts are those of the conservative buffer: an instance that is left out shows at no point of the
@@ -36,6 +36,7 @@ use super::Meaning;
 use super::buffer::{Band, Frame, Occluder, OcclusionOptions};
 use crate::conventions::{View, ViewError};
 use crate::index::SceneIndex;
+use crate::scene::HidingMaterials;
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -67,7 +68,8 @@ pub struct CullOptions {
     pub boxes_an_instance: u32,
     /// Start by drawing what hid something in this culler's last frame of the same view number, in the order of then;
     /// leave out for some frames what was drawn and hid too little. A frame whose eye goes or turns more than four
-    /// times as far as the last one's did, or turns by half a radian, begins from nothing.
+    /// times as far as the last one's did, or turns by half a radian, begins from nothing; so does one of another
+    /// projection or size.
     pub coherence: bool,
     /// With coherence, an occluder of which more faces than this were drawn for each box that it hid, and for one
     /// more, is left out for some frames.
@@ -102,9 +104,10 @@ impl Default for CullOptions {
 pub enum Reason {
     /// A box of it shows between the occluders.
     Shows,
-    /// It reaches the near plane.
+    /// A box around it reaches the near plane.
     ReachesNearPlane,
-    /// Nothing of it is before the near plane and inside the picture's sides; sampled, nothing at a pixel's centre.
+    /// Nothing of it is beyond the near plane, before an orthographic view's far one, and inside the picture's sides;
+    /// sampled, nothing at a pixel's centre.
     OutsideView,
     /// Occluders hide a box around it, or around the group that it is in.
     BoxHidden,
@@ -147,9 +150,11 @@ pub struct CullCounters {
 /// What may be seen of a scene from one eye.
 #[derive(Clone, Debug, Default)]
 pub struct Culling {
-    /// Numbers of the instances that may be seen, nearest first.
+    /// Numbers of the instances that may be seen, nearest first: by the nearest points of their boxes, along the axis
+    /// of the view.
     pub visible: Vec<u32>,
-    /// Why, for all instances, in no particular order; empty unless asked for.
+    /// Why, for all instances of which there is something to see (not of empty meshes, nor of what is switched off), in
+    /// no particular order; empty unless asked for.
     pub judged: Vec<Judged>,
     /// What was done.
     pub counters: CullCounters,
@@ -231,8 +236,9 @@ impl Culler {
     pub fn prepare(&mut self, index: &SceneIndex) {
         if self.serial != Some(index.serial) {
             let scene = index.scene();
-            self.occluders =
-                scene.meshes.par_iter().map(|mesh| Occluder::of_mesh(mesh, &scene.materials)).collect();
+            let materials = HidingMaterials::new(scene);
+            let prepare = |mesh| Occluder::of_mesh(mesh, materials.of(mesh));
+            self.occluders = scene.meshes.par_iter().map(prepare).collect();
             self.serial = Some(index.serial);
             self.views.clear();
         }

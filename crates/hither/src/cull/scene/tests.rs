@@ -219,6 +219,19 @@ fn coarse_pixels_are_refused_where_they_have_no_meaning() {
 }
 
 #[test]
+fn pixels_larger_than_any_image_leave_out_nothing_that_shows() {
+    for seed in 0..20 {
+        let index = SceneIndex::build(trouble::scene(seed), &IndexOptions::default());
+        let view = trouble::view(seed);
+        for (coarseness, eye_moves) in [(1 << 20, 0.0), (1 << 16, 0.01), (1 << 28, 0.01), (u32::MAX, 0.01)] {
+            let options = CullOptions { coarseness, eye_moves, ..CullOptions::default() };
+            let visible: HashSet<u32> = cull(&index, &view, &options).unwrap().visible.into_iter().collect();
+            assert!(shown(&index, &view).is_subset(&visible), "seed {seed}, {coarseness}");
+        }
+    }
+}
+
+#[test]
 fn occluders_that_rest_and_wake_change_nothing_that_shows() {
     let (mut idle, mut drawn) = (0, 0);
     for seed in 0..60 {

@@ -700,13 +700,16 @@ enum Shows {
 }
 
 /// How many instances a group expands to.
-fn instances_of(group: &GroupIndex, index: &SceneIndex) -> u32 {
-    let Some(last) = group.items.last() else { return 0 };
-    last.first_instance
-        + match last.content {
-            Content::Group(g) => instances_of(&index.groups[g as usize], index),
-            _ => 1,
+fn instances_of<'a>(mut group: &'a GroupIndex, index: &'a SceneIndex) -> u32 {
+    let mut before = 0;
+    while let Some(last) = group.items.last() {
+        before += last.first_instance;
+        match last.content {
+            Content::Group(g) => group = &index.groups[g as usize],
+            _ => return before + 1,
         }
+    }
+    before
 }
 
 /// The mesh of an instance, and its transform with the very operations of the walk.

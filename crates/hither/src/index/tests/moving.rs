@@ -157,6 +157,42 @@ fn a_tree_grown_loose_is_built_anew() {
     }
 }
 
+/// Half the surface of all boxes of a tree.
+fn area(tree: &WideTree) -> f64 {
+    let slots = |node: &WideNode| (0..node.used as usize).map(|s| node.bounds_of(s)).collect::<Vec<_>>();
+    tree.nodes.iter().flat_map(slots).filter(|b| !b.is_empty()).map(|b| b.half_area()).sum()
+}
+
+#[test]
+fn a_tree_forgets_what_was_far_away_or_nowhere_for_a_while() {
+    let mut scene = Scene::new("swarm");
+    scene.meshes.push(triangle());
+    for i in 0..400 {
+        scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(1.0)));
+    }
+    for away in [3e3, 1e15, 1e30, f64::NAN, f64::INFINITY] {
+        let mut index = SceneIndex::build(scene.clone(), &IndexOptions::default());
+        let mut random = Random(5);
+        let places = |random: &mut Random, far: u32| -> Vec<(u32, Transform)> {
+            let place = |n: u32| random.point(100.0) * if n < far { away / 100.0 } else { 1.0 };
+            (0..400)
+                .map(place)
+                .map(Transform::from_translation)
+                .enumerate()
+                .map(|(n, t)| (n as u32, t))
+                .collect()
+        };
+        for far in [0, 20, 20, 0, 0, 0] {
+            index.set_transforms(places(&mut random, far));
+        }
+        let mut fresh = SceneIndex::build(scene.clone(), &IndexOptions::default());
+        let now = index.scene().root_group().nodes.iter().enumerate().map(|(n, node)| (n as u32, node.local));
+        fresh.set_transforms(now);
+        let (kept, anew) = (area(&index.groups[0].moving), area(&fresh.groups[0].moving));
+        assert!(kept < anew * 1.6, "{away}: {kept}, built anew {anew}");
+    }
+}
+
 #[test]
 fn a_pose_moves_what_its_channels_name_and_what_hangs_from_it() {
     use crate::scene::{Animation, Channel, Interpolation, Property};
