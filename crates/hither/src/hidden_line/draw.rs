@@ -309,6 +309,7 @@ fn add_meetings(
         let mut aside = Counters::default();
         intersections::add(tracer, &Kinds::ALL, bounds, &mut aside);
         counters.tests += aside.tests;
+        counters.pairs += aside.pairs;
     }
     intersections::add_sections(tracer, true, bounds, &mut Counters::default());
 }

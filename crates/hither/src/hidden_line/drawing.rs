@@ -123,6 +123,8 @@ pub struct Counters {
     pub lines: u64,
     /// Exact tests of a line against a triangle, also of lines that only bound faces.
     pub tests: u64,
+    /// Pairs of triangles that were looked at for a line in which they meet, as often as they share a cell.
+    pub pairs: u64,
     /// Line segments before joining.
     pub segments: u64,
     /// Of these, visible.

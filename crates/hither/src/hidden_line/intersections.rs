@@ -1,7 +1,8 @@
 //! Lines in which surfaces meet: where they pass through each other, and where an edge of one lies on the
 //! other.
 //!
-//! Pairs of triangles that may be seen are found through the grid: those whose boxes and depths overlap.
+//! Pairs of triangles that may be seen are found through the grid: those whose boxes and depths overlap, and which
+//! are not known to lie in one plane (`flats`).
 //! Of a pair each triangle cuts the other's plane in a segment; both segments lie on the line common to the
 //! planes, and their overlap is where the triangles meet. A corner nearer to the other's plane than the
 //! tolerance lies in it. The cut of an edge by a plane is computed the same for all triangles at that edge,
@@ -10,6 +11,7 @@
 use super::Kinds;
 use super::draw::{Piece, is_live, push_parts};
 use super::drawing::{Counters, Kind};
+use super::flats::Flats;
 use super::shown::{SectionLine, Shown};
 use super::topology::{Mix, NONE, ordered};
 use super::trace::{NO_SHEET, Own, Scratch, Tracer};
@@ -44,7 +46,7 @@ pub(super) fn add(tracer: &Tracer, kinds: &Kinds, pieces: &mut Vec<Piece>, count
     if wanted {
         crew.extend(&mut planes, list.len(), |i| Plane::of(tracer.shown, list[i].triangle));
     }
-    let meetings = meetings(tracer, kinds, &planes);
+    let (meetings, pairs) = meetings(tracer, kinds, &planes);
     let of_chunk = |scratch: &mut Scratch, chunk: &[Meeting]| {
         let mut pieces = Vec::new();
         for meeting in chunk {
@@ -71,6 +73,7 @@ pub(super) fn add(tracer: &Tracer, kinds: &Kinds, pieces: &mut Vec<Piece>, count
     let chunks = meetings.chunks(CHUNK).collect();
     let found = crew.map_with(chunks, || Scratch::new(tracer.occluders), of_chunk);
     counters.lines += meetings.len() as u64;
+    counters.pairs += pairs;
     for (more, tests) in found {
         pieces.extend(more);
         counters.tests += tests;
@@ -78,26 +81,28 @@ pub(super) fn add(tracer: &Tracer, kinds: &Kinds, pieces: &mut Vec<Piece>, count
     add_sections(tracer, false, pieces, counters);
 }
 
-/// The meetings of the kinds that are wanted, each once.
-fn meetings(tracer: &Tracer, kinds: &Kinds, planes: &[Plane]) -> Vec<Meeting> {
+/// The meetings of the kinds that are wanted, each once, and how many pairs were tried for them.
+fn meetings(tracer: &Tracer, kinds: &Kinds, planes: &[Plane]) -> (Vec<Meeting>, u64) {
     if planes.is_empty() {
-        return Vec::new();
+        return (Vec::new(), 0);
     }
+    let flats = Flats::find(tracer.shown, tracer.surfaces, planes);
     let of_band = |band: usize| {
         let rows = tracer.surfaces.grid.rows;
         let rows = rows * band / BANDS..rows * (band + 1) / BANDS;
         let mut found = Vec::new();
-        meetings_in_rows(tracer, planes, rows, &mut found);
-        found
+        let pairs = meetings_in_rows(tracer, planes, &flats, rows, &mut found);
+        (found, pairs)
     };
     let found = tracer.shown.crew.map((0..BANDS).collect(), of_band);
     let mut known: HashSet<[u32; 2], Mix> = HashSet::default();
-    let mut all: Vec<Meeting> = found.into_iter().flatten().collect();
+    let pairs = found.iter().map(|band| band.1).sum();
+    let mut all: Vec<Meeting> = found.into_iter().flat_map(|band| band.0).collect();
     all.retain(|m| {
         let wanted = if m.kind == Kind::Intersection { kinds.intersection } else { kinds.contact };
         wanted && (!m.repeats || known.insert(m.triangles))
     });
-    all
+    (all, pairs)
 }
 
 /// The outlines of cuts; also those by the view's range of depth, if they are wanted.
@@ -132,8 +137,8 @@ fn is_cut_at(shown: &Shown, line: &SectionLine, triangle: u32) -> bool {
 }
 
 /// The plane of a triangle in view space.
-struct Plane {
-    normal: DVec3,
+pub(super) struct Plane {
+    pub normal: DVec3,
     offset: f64,
 }
 
@@ -144,75 +149,107 @@ impl Plane {
         Plane { normal, offset: -normal.dot(a) }
     }
 
+    /// Distance of a point, signed.
+    #[inline(always)]
+    pub fn side(&self, p: DVec3) -> f64 {
+        self.normal.dot(p) + self.offset
+    }
+
     /// Whether all corners are farther from the plane than `tolerance`, on one side.
     fn misses(&self, corners: &[DVec3; 3], tolerance: f64) -> bool {
-        let side = |p: DVec3| self.normal.dot(p) + self.offset;
-        let [a, b, c] = [side(corners[0]), side(corners[1]), side(corners[2])];
+        // Not by `map`, which is not always inlined.
+        let [a, b, c] = [self.side(corners[0]), self.side(corners[1]), self.side(corners[2])];
         (a > tolerance && b > tolerance && c > tolerance)
             || (a < -tolerance && b < -tolerance && c < -tolerance)
     }
 }
 
-/// The meetings of pairs of triangles that share a cell of these rows, each once.
-fn meetings_in_rows(tracer: &Tracer, planes: &[Plane], rows: Range<usize>, found: &mut Vec<Meeting>) {
+/// The meetings of pairs of triangles that share a cell of these rows, each once; returns how many pairs were tried,
+/// as often as they share a cell.
+fn meetings_in_rows(
+    tracer: &Tracer,
+    planes: &[Plane],
+    flats: &Flats,
+    rows: Range<usize>,
+    found: &mut Vec<Meeting>,
+) -> u64 {
     let (shown, occluders) = (tracer.shown, tracer.surfaces);
     let grid = &occluders.grid;
     // A plane's offset is rounded: what it rejects must be clearly beyond the tolerance.
     let clear = shown.lens.tolerance * 2.0;
     let mut known: HashSet<(u32, u32), Mix> = HashSet::default();
+    let mut skips = Vec::new();
+    let mut pairs = 0;
     for cell in rows.start * grid.columns..rows.end * grid.columns {
         let (column, row) = (cell % grid.columns, cell / grid.columns);
         let list = occluders.in_cell(cell);
+        flats.skips(list, &mut skips);
         for (i, &a) in list.iter().enumerate() {
             let first = &occluders.list[a as usize];
             let reach = first.bounds().reach();
             let (farthest, nearest) = (f64::from(first.farthest), f64::from(first.nearest));
             let least = farthest - shown.lens.coarse(nearest);
             let corners = shown.corners_in_view(first.triangle);
-            for &b in &list[i + 1..] {
+            let mut next = i + 1;
+            while let Some(&b) = list.get(next) {
+                pairs += 1;
+                if flats.share(a, b) {
+                    next = skips[next];
+                    continue;
+                }
+                next += 1;
                 let second = &occluders.list[b as usize];
                 if f64::from(second.nearest) < least {
                     break;
                 }
+                let of = [&planes[a as usize], &planes[b as usize]];
                 if !second.bounds().meets(reach)
-                    || planes[b as usize].misses(&corners, clear)
-                    || planes[a as usize].misses(&shown.corners_in_view(second.triangle), clear)
+                    || of[1].misses(&corners, clear)
+                    || of[0].misses(&shown.corners_in_view(second.triangle), clear)
                 {
                     continue;
                 }
+                let triangles = [first.triangle, second.triangle];
                 // Pairs share several cells. Small ones count in the cell where their boxes' overlap begins;
-                // large ones are not in every cell, and count in each band once.
+                // large ones are not in every cell, and count in each band once. Only meetings are remembered:
+                // they are far fewer than pairs that do not meet after all.
                 if occluders.large[a as usize] || occluders.large[b as usize] {
-                    if known.insert((a, b)) {
-                        let meeting = meeting(shown, first.triangle, second.triangle);
-                        found.extend(meeting.map(|m| Meeting { repeats: true, ..m }));
+                    if !known.contains(&(a, b))
+                        && let Some(meeting) = meeting(shown, triangles, of)
+                    {
+                        known.insert((a, b));
+                        found.push(Meeting { repeats: true, ..meeting });
                     }
                     continue;
                 }
                 let begin = first.bounds().min().max(second.bounds().min());
                 if grid.column(begin.x) == column && grid.row(begin.y) == row {
-                    found.extend(meeting(shown, first.triangle, second.triangle));
+                    found.extend(meeting(shown, triangles, of));
                 }
             }
         }
     }
+    pairs
 }
 
-/// Where two triangles meet, unless they share an edge, lie in one plane, or meet in less than a line.
-fn meeting(shown: &Shown, a: u32, b: u32) -> Option<Meeting> {
+/// Where two triangles meet, of which these are the planes, unless they share an edge, lie in one plane, or meet in
+/// less than a line. What ends most pairs for least comes first.
+fn meeting(shown: &Shown, [a, b]: [u32; 2], planes: [&Plane; 2]) -> Option<Meeting> {
     if shown.cap(a).is_some() || shown.cap(b).is_some() {
         return None;
     }
     let vertices = [a, b].map(|t| shown.triangles[t as usize]);
-    if vertices[0].iter().filter(|v| vertices[1].contains(v)).count() > 1 || abut(shown, a, b) {
+    if vertices[0].iter().filter(|v| vertices[1].contains(v)).count() > 1 {
         return None;
     }
     debug_assert!(is_live(shown, a) && is_live(shown, b));
     let corners = [shown.corners_in_view(a), shown.corners_in_view(b)];
-    let normal = |c: &[DVec3; 3]| (c[1] - c[0]).cross(c[2] - c[0]).normalize_or_zero();
-    let n = [normal(&corners[0]), normal(&corners[1])];
+    let n = [planes[0].normal, planes[1].normal];
     let sides_b = sides(shown, &corners[1], &corners[0], n[0])?;
     let sides_a = sides(shown, &corners[0], &corners[1], n[1])?;
+    if is_point(&sides_a) || is_point(&sides_b) || abut(shown, a, b) {
+        return None;
+    }
     let direction = n[0].cross(n[1]);
     if direction.length_squared() < PARALLEL * PARALLEL {
         return None;
@@ -249,14 +286,27 @@ fn abut(shown: &Shown, a: u32, b: u32) -> bool {
 /// On which side of another triangle's plane each corner is: a distance, or 0 within the tolerance. `None` if
 /// the triangle does not reach the plane, or lies in it.
 fn sides(shown: &Shown, corners: &[DVec3; 3], plane: &[DVec3; 3], normal: DVec3) -> Option<[f64; 3]> {
-    let of_plane = shown.lens.rounding_of_plane(normal, plane).min(shown.lens.tolerance);
-    let sides = corners.map(|c| {
+    let lens = &shown.lens;
+    // Neither of the roundings is more than the tolerance, which is known already.
+    let lies = |c: DVec3, side: f64| {
+        side.abs() <= lens.tolerance
+            && (side.abs() <= lens.rounding_of_point(c)
+                || side.abs() <= lens.rounding_of_plane(normal, plane))
+    };
+    let side = |c: DVec3| {
         let side = normal.dot(c - plane[0]);
-        if side.abs() <= of_plane.max(shown.lens.rounding_of_point(c)) { 0.0 } else { side }
-    });
+        if lies(c, side) { 0.0 } else { side }
+    };
+    let sides = [side(corners[0]), side(corners[1]), side(corners[2])];
     let reaches = sides.iter().any(|&s| s >= 0.0) && sides.iter().any(|&s| s <= 0.0);
     let lies_in = sides.iter().all(|&s| s == 0.0);
     (reaches && !lies_in).then_some(sides)
+}
+
+/// Whether a triangle has no more than a corner in a plane: the others are on one side of it.
+fn is_point(sides: &[f64; 3]) -> bool {
+    let on = |sign: f64| sides.iter().filter(|&&s| s * sign > 0.0).count();
+    sides.contains(&0.0) && on(1.0).max(on(-1.0)) == 2
 }
 
 /// The segment in which a triangle cuts a plane, ordered along `direction`; `None` if it is a point.

@@ -10,7 +10,8 @@
 //!    cell of a grid how far one can see there, and whole instances and triangles beyond that are left out;
 //!    so are the backs of `bodies`.
 //! 2. `edges`: the edges to draw are chosen by their kind in this view; `junctions` has joined those that meet
-//!    part of the way. `intersections` adds the lines in which surfaces meet.
+//!    part of the way. `intersections` adds the lines in which surfaces meet; `flats` knows crowds of
+//!    triangles in one plane, which do not.
 //! 3. `trace`: each line is followed through the grid; `hide` finds the exact part that one triangle hides.
 //!    Signs that decide are exact ([Shewchuk 1997]); end points are crossings of lines, never samples.
 //! 4. `coincident` draws once what lies on one another; `joints` joins the rest into few long strokes, and `strokes`
@@ -36,6 +37,7 @@ mod draw;
 mod drawing;
 mod edges;
 mod faces;
+mod flats;
 mod grid;
 mod hatch;
 mod hide;

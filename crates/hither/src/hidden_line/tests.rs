@@ -2,6 +2,7 @@
 
 mod bodies;
 mod cuts;
+mod flats;
 mod junctions;
 mod scenes;
 

@@ -232,6 +232,7 @@ impl Made {
                 "triangles_live": self.total(|d| d.counters.triangles_live),
                 "lines": self.total(|d| d.counters.lines),
                 "tests": self.total(|d| d.counters.tests),
+                "pairs": self.total(|d| d.counters.pairs),
             },
         })
     }
