@@ -11,11 +11,18 @@ pub(super) struct Refit {
     /// Total surface of the boxes now, and when the tree was built.
     area: f64,
     built_area: f64,
+    /// Leaves that the tree was built of, and how often one got another box since.
+    leaves: u64,
+    changes: u64,
 }
 
 /// A tree is worth rebuilding once its boxes have this many times the surface they were built with, or were built with
 /// this many times what they have.
 const LOOSE: f64 = 1.5;
+
+/// And, whatever its boxes, once each of its leaves has changed so often, on average: it may have been built badly, around
+/// something far away that has gone. That costs a few hundredths of what the changes do.
+const CHANGES: u64 = 256;
 
 /// A box so large, square metres, is around something that is nowhere, and says nothing of how well the others lie.
 const NOWHERE: f64 = 1e30;
@@ -29,22 +36,24 @@ fn area(bounds: &Box3) -> f64 {
 impl Refit {
     pub fn new(tree: &WideTree) -> Refit {
         let mut above = vec![(0, 0); tree.nodes.len()];
-        let mut sum = 0.0;
+        let (mut sum, mut leaves) = (0.0, 0);
         for (n, node) in tree.nodes.iter().enumerate() {
             for slot in (0..node.used as usize).filter(|&s| node.child[s] != Slot::EMPTY) {
                 sum += area(&node.bounds_of(slot));
-                if let Child::Node(child) = node.child[slot].child() {
-                    above[child as usize] = (n as u32, slot as u32);
+                match node.child[slot].child() {
+                    Child::Node(child) => above[child as usize] = (n as u32, slot as u32),
+                    Child::Leaf(_) => leaves += 1,
                 }
             }
         }
-        Refit { above, area: sum, built_area: sum }
+        Refit { above, area: sum, built_area: sum, leaves, changes: 0 }
     }
 
     /// Whether the boxes have grown so much, or shrunk, that the tree should be built anew. What shrinks was built around
     /// something that has gone, and a sum that it went from is no longer known well.
     pub fn is_loose(&self) -> bool {
-        !(self.area <= LOOSE * self.built_area && self.area * LOOSE >= self.built_area)
+        let as_built = self.area <= LOOSE * self.built_area && self.area * LOOSE >= self.built_area;
+        !as_built || self.changes > CHANGES * self.leaves
     }
 
     /// Takes the boxes as they are now for those that the tree was built with.
@@ -60,6 +69,7 @@ impl Refit {
         for (node, slot, bounds, leaf) in leaves {
             let child = if bounds.is_empty() { Slot::EMPTY } else { Slot::leaf(leaf as usize) };
             self.set_slot(tree, (node, slot), &bounds, child);
+            self.changes += 1;
             touched.push(node);
         }
         while let Some(node) = touched.pop() {
