@@ -441,3 +441,38 @@ fn what_may_be_seen_comes_nearest_first() {
     }
     assert!(pairs > 3000, "{pairs}");
 }
+
+/// A rough wall 16 metres wide and 12 high, 5 metres before the eye, of so many squares each way.
+fn rough_wall(cells: u32) -> Mesh {
+    let random = &mut trouble::Random::new(3);
+    let mut wall = Mesh::default();
+    for (row, column) in (0..=cells).flat_map(|row| (0..=cells).map(move |column| (row, column))) {
+        let at = |n: u32, size: f64| size * (f64::from(n) / f64::from(cells) - 0.5);
+        wall.positions
+            .push(DVec3::new(at(column, 16.0), at(row, 12.0), -5.0 + random.between(-0.03, 0.03)).as_vec3());
+    }
+    for (row, column) in (0..cells).flat_map(|row| (0..cells).map(move |column| (row, column))) {
+        let a = row * (cells + 1) + column;
+        let (b, c, d) = (a + 1, a + cells + 2, a + cells + 1);
+        wall.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+    wall.primitives.push(Primitive { triangles: 0..wall.triangles.len() as u32, material: None });
+    wall
+}
+
+#[test]
+fn a_wall_that_fills_the_view_hides_whatever_it_is_made_of() {
+    let projection = Projection::Perspective { fov_y: 0.6, near: 0.1 };
+    let view = View::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, projection, (640, 360));
+    for cells in [4, 40, 160] {
+        let mut scene = Scene::new("rough wall");
+        scene.meshes = vec![rough_wall(cells), unit_cube()];
+        for (mesh, z) in [(0, 0.0), (1, -8.0), (1, -20.0), (1, -3.0)] {
+            let local = Transform::from_translation(DVec3::Z * z);
+            scene.groups[0].push(Node { content: Content::Mesh(mesh), local, ..Node::default() });
+        }
+        let index = SceneIndex::build(scene, &IndexOptions::default());
+        let found = cull(&index, &view, &CullOptions::default()).unwrap();
+        assert_eq!(found.visible, [3, 0], "{cells}");
+    }
+}
