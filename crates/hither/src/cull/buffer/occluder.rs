@@ -362,20 +362,16 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
             occluder.vertices.repeat_last();
         }
         let convex = add_convex(&mut occluder, first_face, first_vertex);
+        let (these, vertices) = (&occluder.faces[first_face as usize..], &occluder.vertices);
         occluder.patches.push(Patch {
             first_vertex,
-            vertices: occluder.vertices.x.len() as u32 - first_vertex,
+            vertices: vertices.x.len() as u32 - first_vertex,
             first_face,
-            faces: occluder.faces.len() as u32 - first_face,
-            fine: occluder.fine.push(
-                &occluder.faces[first_face as usize..],
-                &occluder.vertices,
-                first_vertex,
-            ),
+            faces: these.len() as u32,
+            fine: occluder.fine.push(these, vertices, first_vertex),
             convex,
             inner: 0..0,
-            folds: convex.is_none()
-                && folds(&occluder.faces[first_face as usize..], &occluder.vertices, first_vertex),
+            folds: convex.is_none() && folds(these, vertices, first_vertex),
         });
         boxes.push(bounds);
     }
