@@ -21,7 +21,7 @@ pub(super) struct Refit {
 const LOOSE: f64 = 1.5;
 
 /// And, whatever its boxes, once each of its leaves has changed so often, on average: it may have been built badly, around
-/// something far away that has gone. That costs a few hundredths of what the changes do.
+/// something far away that has gone.
 const CHANGES: u64 = 256;
 
 /// A box so large, square metres, is around something that is nowhere, and says nothing of how well the others lie.

@@ -17,8 +17,8 @@
 //! its surface the pieces that are large enough. With coherence each box that is found hidden counts for who was
 //! drawn last in its middle, and an occluder of many faces that little counted for is not tried again for some
 //! frames. A view that jumps begins anew: what hid nothing from there may hide everything from here. Transparent
-//! surfaces never hide, and masked ones only where the mask cannot have a hole. Nothing is kept of where an occluder is, so one that moves or is switched off
-//! costs nothing but its place in the index.
+//! surfaces never hide, and masked ones only where the mask cannot have a hole. Nothing is kept of where an occluder
+//! is, so one that moves or is switched off costs nothing but its place in the index.
 //!
 //! The verdicts are those of the conservative buffer: an instance that is left out shows at no point of the
 //! continuous image; or, with [`Meaning::Sampled`], at no pixel's centre. As the former holds at every resolution, the
