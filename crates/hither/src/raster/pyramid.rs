@@ -82,50 +82,73 @@ pub struct Target {
     pub(super) lanes: Option<Box<Lanes>>,
 }
 
+/// Gives a list a length; whatever it holds.
+fn fit<T: Copy>(list: &mut Vec<T>, length: usize, value: T) {
+    if list.capacity() < length {
+        list.clear();
+        // A little more, for windows that grow a little.
+        list.reserve_exact(length + length / 8);
+    }
+    list.resize(length, value);
+}
+
 impl Target {
     /// A window with its top left corner at image pixel (`left`, `top`), cleared.
     pub fn new(left: u32, top: u32, width: u32, height: u32) -> Target {
+        let mut target = Target {
+            left: 0,
+            top: 0,
+            width: 0,
+            height: 0,
+            counters: TargetCounters::default(),
+            tiles_x: 0,
+            depth: Vec::new(),
+            id: Vec::new(),
+            block_id: Vec::new(),
+            touched: Vec::new(),
+            levels: Vec::new(),
+            surfaces: Vec::new(),
+            visits: None,
+            lanes: None,
+        };
+        target.reshape(left, top, width, height);
+        target
+    }
+
+    /// Makes it a window like a new one, in the memory that it has if that is enough.
+    pub fn reshape(&mut self, left: u32, top: u32, width: u32, height: u32) {
         assert!(
             left.is_multiple_of(super::TILE) && top.is_multiple_of(super::TILE),
             "windows start on tiles"
         );
         assert!(width > 0 && height > 0, "a window has pixels");
+        (self.left, self.top, self.width, self.height) =
+            (left as i32, top as i32, width as i32, height as i32);
         let (tiles_x, tiles_y) = (width.div_ceil(16) as usize, height.div_ceil(16) as usize);
         let blocks = tiles_x * tiles_y * 16;
-        let mut levels = Vec::new();
-        let (mut columns, mut rows) = (tiles_x, tiles_y);
+        self.tiles_x = tiles_x;
+        // What they hold is set when a tile is first touched.
+        fit(&mut self.depth, blocks, Sixteen([0.0; 16]));
+        fit(&mut self.id, blocks, Sixteen([0; 16]));
+        fit(&mut self.block_id, blocks, MIXED);
+        fit(&mut self.touched, tiles_x * tiles_y, false);
+        let (mut columns, mut rows, mut depth) = (tiles_x, tiles_y, 0);
         loop {
-            let parents = columns * rows;
-            levels.push(PyramidLevel {
-                columns,
-                rows,
-                min: vec![Sixteen([0.0; 16]); parents],
-                stale: vec![0; parents],
-            });
-            if parents == 1 {
+            if self.levels.len() == depth {
+                self.levels.push(PyramidLevel::default());
+            }
+            let level = &mut self.levels[depth];
+            (level.columns, level.rows) = (columns, rows);
+            fit(&mut level.min, columns * rows, Sixteen([0.0; 16]));
+            fit(&mut level.stale, columns * rows, 0);
+            depth += 1;
+            if columns * rows == 1 {
                 break;
             }
             (columns, rows) = (columns.div_ceil(4), rows.div_ceil(4));
         }
-        let mut target = Target {
-            left: left as i32,
-            top: top as i32,
-            width: width as i32,
-            height: height as i32,
-            counters: TargetCounters::default(),
-            tiles_x,
-
-            depth: vec![Sixteen([0.0; 16]); blocks],
-            id: vec![Sixteen([0; 16]); blocks],
-            block_id: vec![MIXED; blocks],
-            touched: vec![false; tiles_x * tiles_y],
-            levels,
-            surfaces: Vec::new(),
-            visits: None,
-            lanes: None,
-        };
-        target.clear();
-        target
+        self.levels.truncate(depth);
+        self.clear();
     }
 
     /// Makes the window empty again.

@@ -6,6 +6,7 @@ mod frame;
 mod queue;
 mod shade;
 mod walk;
+mod windows;
 
 pub use blend::{BlendedTriangles, Fragment};
 pub use coherence::Coherence;
@@ -20,6 +21,7 @@ use crate::raster::{TILE, Target};
 use fearless_simd::Level;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::Mutex;
+use windows::Shares;
 
 /// How visibility is found. The pictures are the same to the last bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,6 +84,7 @@ pub struct Renderer {
     /// All but the thread that asks for a frame: starting them takes as long as drawing a small one.
     workers: Option<ThreadPool>,
     memories: Vec<walk::Memory>,
+    shares: Shares,
     /// Which index and which windows `memories` speak of.
     remembered: (u64, Vec<u32>),
 }
@@ -104,33 +107,32 @@ impl Renderer {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             n => n,
         };
-        let columns = window_columns(view, threads, options.window_width);
+        let columns = match options.window_width {
+            0 => self.shares.columns(view.width, threads),
+            width => windows::equal(view.width, width.next_multiple_of(TILE)),
+        };
         let mut windows = self.take_windows(view, &columns);
         for window in &mut windows {
             window.record_visits(options.complexity);
         }
         self.prepare_workers(threads);
-        let draw = |(window, memory): Work| {
-            walk::draw_window(
-                options.level,
-                index,
-                view,
-                (options.algorithm, options.box_test),
-                window,
-                memory,
-            )
+        let draw = |(window, memory, done): Work| {
+            let how = (options.algorithm, options.box_test);
+            *done = walk::draw_window(options.level, index, view, how, window, memory);
         };
         let plain = options.algorithm == Algorithm::ZBuffer;
         self.prepare_memories(if plain { Coherence::Never } else { options.coherence }, index, &columns);
         let memories = self.memories.iter_mut().map(Some).chain(std::iter::repeat_with(|| None));
-        let work = windows.iter_mut().zip(memories);
-        let counters = match &self.workers {
+        let mut done = vec![Counters::default(); windows.len()];
+        let work = windows.iter_mut().zip(memories).zip(&mut done);
+        let work = work.map(|((window, memory), done)| (window, memory, done));
+        match &self.workers {
             Some(workers) => in_parallel(workers, work, draw),
-            None => work.map(draw).fold(Counters::default(), |mut sum, c| {
-                sum += c;
-                sum
-            }),
-        };
+            None => work.for_each(draw),
+        }
+        self.shares.learn(view.width, threads, &columns, &done);
+        let mut counters = Counters::default();
+        done.into_iter().for_each(|of_window| counters += of_window);
         let mut frame = Frame { view: *view, counters, complexity: None, windows, columns };
         if options.complexity {
             frame.gather_complexity();
@@ -175,18 +177,14 @@ impl Renderer {
     fn take_windows(&mut self, view: &View, columns: &[u32]) -> Vec<Target> {
         let ends = columns.iter().skip(1).copied().chain([view.width]);
         let wanted = || columns.iter().zip(ends.clone()).map(|(&from, to)| (from, to - from));
-        let spare = std::mem::take(&mut self.spare);
-        let fits = spare.len() == columns.len()
-            && wanted().zip(&spare).all(|((left, width), t)| {
-                t.left == left as i32 && t.width == width as i32 && t.height == view.height as i32
-            });
-        if fits {
-            let mut windows = spare;
-            windows.iter_mut().for_each(Target::clear);
-            return windows;
+        let mut windows = std::mem::take(&mut self.spare);
+        windows.truncate(columns.len());
+        for (window, (left, width)) in windows.iter_mut().zip(wanted()) {
+            window.reshape(left, 0, width, view.height);
         }
-        drop(spare);
-        wanted().map(|(left, width)| Target::new(left, 0, width, view.height)).collect()
+        let more = wanted().skip(windows.len());
+        windows.extend(more.map(|(left, width)| Target::new(left, 0, width, view.height)));
+        windows
     }
 }
 
@@ -195,37 +193,20 @@ pub fn render(index: &SceneIndex, view: &View, options: &RenderOptions) -> Resul
     Renderer::new().render(index, view, options)
 }
 
-/// Where the image is cut into upright windows [Greene 1995, §3.5.5].
-fn window_columns(view: &View, threads: usize, window_width: u32) -> Vec<u32> {
-    let width = if window_width > 0 {
-        window_width.next_multiple_of(TILE)
-    } else if threads == 1 {
-        view.width
-    } else {
-        view.width.div_ceil(threads as u32 * WINDOWS_A_THREAD).next_multiple_of(64)
-    };
-    (0..view.width).step_by(width as usize).collect()
-}
-
-/// More windows balance the load, but each walks the tree anew.
-const WINDOWS_A_THREAD: u32 = 2;
-
-/// A window to be drawn, and what it showed last time.
-type Work<'a> = (&'a mut Target, Option<&'a mut walk::Memory>);
+/// A window to be drawn, what it showed last time, and what is done for it.
+type Work<'a> = (&'a mut Target, Option<&'a mut walk::Memory>, &'a mut Counters);
 
 /// All workers, and this thread with them, take the next window until none is left.
 fn in_parallel<'a>(
     workers: &ThreadPool,
     work: impl Iterator<Item = Work<'a>> + Send,
-    draw: impl Fn(Work) -> Counters + Sync,
-) -> Counters {
+    draw: impl Fn(Work) + Sync,
+) {
     let queue = Mutex::new(work);
-    let sum = Mutex::new(Counters::default());
     let take = || queue.lock().expect("no worker panics while it holds the lock").next();
     let work = || {
         while let Some(window) = take() {
-            let counters = draw(window);
-            *sum.lock().expect("adding does not panic") += counters;
+            draw(window);
         }
     };
     workers.in_place_scope(|scope| {
@@ -234,5 +215,4 @@ fn in_parallel<'a>(
         }
         work();
     });
-    sum.into_inner().expect("adding does not panic")
 }
