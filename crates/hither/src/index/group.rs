@@ -10,8 +10,10 @@ use super::poses::Poses;
 use super::refit::Refit;
 use super::tree::{Box3, Child, Slot, WideTree};
 use super::{bvh, octree};
+use crate::geometry::Aabb;
+use crate::raster::ScreenFromObject;
 use crate::scene::{Content, Group};
-use glam::{DAffine3, DMat3};
+use glam::{DAffine3, DMat3, DVec3};
 
 /// An instance of a mesh or of another group. Small: a walk that finds one hidden needs not know where it is.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +30,8 @@ pub(crate) struct GroupIndex {
     pub items: Vec<Item>,
     /// Of each item, where it is.
     pub group_from_content: Vec<DAffine3>,
+    /// Where the trees' boxes have their origin.
+    middle: DVec3,
     pub resting: WideTree,
     pub moving: WideTree,
     kind: TreeKind,
@@ -62,18 +66,18 @@ impl GroupIndex {
     pub fn build(
         group: &Group,
         kind: TreeKind,
-        content_bounds: impl Fn(Content) -> Box3,
+        content_bounds: impl Fn(Content) -> Aabb,
         instances: impl Fn(Content) -> u64,
     ) -> GroupIndex {
         let world = group.world_transforms();
         let mut first_instance = 0u64;
         let mut index = GroupIndex { kind, ..GroupIndex::default() };
-        let mut primitives = Vec::new();
+        let mut placed = Vec::new();
         for (n, node) in group.nodes.iter().enumerate() {
             if node.content != Content::Nothing {
-                let placed = placed_bounds(&content_bounds(node.content), &world[n]);
-                if !placed.is_empty() {
-                    primitives.push(Primitive::of_box(&placed, index.items.len() as u32));
+                let bounds = placed_bounds(&content_bounds(node.content), &world[n]);
+                if !bounds.is_empty() {
+                    placed.push((bounds, index.items.len() as u32));
                 }
                 index.group_from_content.push(world[n]);
                 index.items.push(Item {
@@ -85,14 +89,32 @@ impl GroupIndex {
             first_instance += instances(node.content);
         }
         index.places = vec![Place { moves: false, node: NOWHERE, slot: 0 }; index.items.len()];
-        index.at_rest = primitives.len();
-        index.resting = tree_of_items(primitives, kind);
+        index.at_rest = placed.len();
+        index.middle = middle_of(&placed);
+        let box_of = |(bounds, item): &(Aabb, u32)| Primitive::of_box(&around(bounds, index.middle), *item);
+        index.resting = tree_of_items(placed.iter().map(box_of).collect(), kind);
         record_places(&index.resting, &mut index.places, false);
         index
     }
 
-    pub fn bounds(&self) -> Box3 {
+    /// The bounds of all items.
+    pub fn bounds(&self) -> Aabb {
+        let Aabb { min, max } = self.bounds_of_trees().to_aabb();
+        Aabb { min: min + self.middle, max: max + self.middle }
+    }
+
+    /// The same in the space of the trees' boxes.
+    pub fn bounds_of_trees(&self) -> Box3 {
         self.resting.bounds().union(&self.moving.bounds())
+    }
+
+    /// To the screen from the space of the trees' boxes, given the way from the group's.
+    #[inline(always)]
+    pub fn screen_from_trees(&self, screen_from_group: &ScreenFromObject) -> ScreenFromObject {
+        match self.middle == DVec3::ZERO {
+            true => *screen_from_group,
+            false => screen_from_group.after(&DAffine3::from_translation(self.middle)),
+        }
     }
 
     pub fn memory_bytes(&self) -> usize {
@@ -115,7 +137,7 @@ impl GroupIndex {
         &mut self,
         group: &Group,
         changed: &[u32],
-        content_bounds: impl Fn(Content) -> Box3,
+        content_bounds: impl Fn(Content) -> Aabb,
     ) -> usize {
         let mut moved = Vec::new();
         let motion = match &mut self.motion {
@@ -143,8 +165,8 @@ impl GroupIndex {
         };
         moved.retain(|&i| self.places[i as usize].node != NOWHERE);
         let bounds_now = |i: u32| {
-            let i = i as usize;
-            placed_bounds(&content_bounds(self.items[i].content), &self.group_from_content[i])
+            let (bounds, i) = (content_bounds(self.items[i as usize].content), i as usize);
+            placed_box(&bounds, &self.group_from_content[i], self.middle)
         };
         let is_off = |i: u32| is_off(&self.group_from_content[i as usize]);
         let before = motion.movers.len();
@@ -183,7 +205,7 @@ impl GroupIndex {
     }
 
     /// Asserts that every item is where `group` has it, and in one slot, whose box and all above contain it.
-    pub fn validate(&self, group: &Group, content_bounds: impl Fn(Content) -> Box3) {
+    pub fn validate(&self, group: &Group, content_bounds: impl Fn(Content) -> Aabb) {
         let world = group.world_transforms();
         let mut slots = vec![0; self.items.len()];
         for (tree, moves) in [(&self.resting, false), (&self.moving, true)] {
@@ -197,7 +219,7 @@ impl GroupIndex {
                             assert_eq!(found, (moves, n, slot), "item {i} is looked for elsewhere");
                             slots[i] += 1;
                             let bounds = content_bounds(self.items[i].content);
-                            placed_bounds(&bounds, &self.group_from_content[i])
+                            placed_box(&bounds, &self.group_from_content[i], self.middle)
                         }
                         Child::Node(c) => tree.nodes[c as usize].bounds(),
                     };
@@ -222,17 +244,51 @@ fn is_off(transform: &DAffine3) -> bool {
 }
 
 /// A content's box seen through its transform, widened by the rounding of that arithmetic.
-fn placed_bounds(bounds: &Box3, transform: &DAffine3) -> Box3 {
+fn placed_bounds(bounds: &Aabb, transform: &DAffine3) -> Aabb {
     if bounds.is_empty() {
-        return Box3::EMPTY;
+        return Aabb::EMPTY;
     }
-    let placed = bounds.to_aabb().transformed(transform);
-    // Three products and sums in f64 on either side: 2⁻⁴⁸ of the terms' size covers both roundings.
-    let reach = bounds.to_aabb().min.abs().max(bounds.to_aabb().max.abs());
+    let placed = bounds.transformed(transform);
+    // Three products and sums in f64 on either side, and what may be added to bounds and taken from what is placed: 2⁻⁴⁸
+    // of the terms' size covers the roundings.
+    let reach = bounds.min.abs().max(bounds.max.abs());
     let m = transform.matrix3;
     let size = m.x_axis.abs() * reach.x + m.y_axis.abs() * reach.y + m.z_axis.abs() * reach.z;
     let slack = (size + transform.translation.abs()) * 2f64.powi(-48);
-    Box3::around(&crate::geometry::Aabb { min: placed.min - slack, max: placed.max + slack })
+    Aabb { min: placed.min - slack, max: placed.max + slack }
+}
+
+/// The same about the origin of the trees' boxes.
+fn placed_box(bounds: &Aabb, transform: &DAffine3, middle: DVec3) -> Box3 {
+    around(&placed_bounds(bounds, transform), middle)
+}
+
+/// A box about another origin, rounded outwards.
+fn around(bounds: &Aabb, middle: DVec3) -> Box3 {
+    Box3::around(&Aabb { min: bounds.min - middle, max: bounds.max - middle })
+}
+
+/// In f32 a coordinate so many times as large as things are is off by a thousandth of them.
+const FAR: f64 = 8192.0;
+
+/// The origin about which boxes of f32 tell best where things are: their middle, along the axes along which they lie
+/// together and far away, as the houses of a town do in a country's coordinates. Others are best left about zero.
+fn middle_of(placed: &[(Aabb, u32)]) -> DVec3 {
+    let mut numbers = Vec::with_capacity(placed.len());
+    let mut median = |of: &dyn Fn(&Aabb) -> f64| {
+        numbers.clear();
+        numbers.extend(placed.iter().map(|(bounds, _)| of(bounds)).filter(|n| n.is_finite()));
+        let half = numbers.len() / 2;
+        if numbers.is_empty() { 0.0 } else { *numbers.select_nth_unstable_by(half, f64::total_cmp).1 }
+    };
+    let extent = median(&|bounds| bounds.size().max_element());
+    DVec3::from([0, 1, 2].map(|axis| {
+        // With few bits, so that differences are exact.
+        let middle = f64::from(median(&|bounds| bounds.center()[axis]) as f32);
+        let apart = median(&|bounds| (bounds.center()[axis] - middle).abs());
+        let far = middle.abs() > FAR * extent && middle.abs() > 4.0 * apart && middle.is_finite();
+        if far { middle } else { 0.0 }
+    }))
 }
 
 /// A tree whose leaves are the primitives' numbers.

@@ -14,6 +14,7 @@ mod poses;
 mod refit;
 mod tree;
 
+use crate::geometry::Aabb;
 pub(crate) use boxes::tree_of_boxes;
 pub(crate) use group::{GroupIndex, Item};
 pub(crate) use mesh::{BlockTree, MeshIndex};
@@ -257,11 +258,11 @@ fn next_serial() -> u64 {
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
-fn content_bounds(meshes: &[MeshIndex], groups: &[GroupIndex], content: Content) -> Box3 {
+fn content_bounds(meshes: &[MeshIndex], groups: &[GroupIndex], content: Content) -> Aabb {
     match content {
-        Content::Mesh(m) => meshes[m as usize].bounds(),
+        Content::Mesh(m) => meshes[m as usize].bounds().to_aabb(),
         Content::Group(g) => groups[g as usize].bounds(),
-        Content::Nothing => Box3::EMPTY,
+        Content::Nothing => Aabb::EMPTY,
     }
 }
 

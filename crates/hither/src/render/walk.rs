@@ -203,6 +203,15 @@ fn tree_of<'a>(context: &Context<'a>, moving: bool) -> &'a WideTree {
     }
 }
 
+/// To the screen from the space of the boxes of what is entered at `at`.
+#[inline(always)]
+fn screen_from_boxes(space: &Space, at: &ScreenFromObject) -> ScreenFromObject {
+    match space {
+        Space::Mesh { .. } => *at,
+        Space::Group(group) => group.screen_from_trees(at),
+    }
+}
+
 #[inline(always)]
 fn rect_of(entry: &Entry) -> Rect {
     let r = &entry.rect;
@@ -260,14 +269,15 @@ impl<'a> Walk<'a> {
         };
         let bounds = bounds.get_or_insert_with(|| match space {
             Space::Mesh { blocks, .. } => blocks.tree.bounds(),
-            Space::Group(group) => group.bounds(),
+            Space::Group(group) => group.bounds_of_trees(),
         });
         if bounds.is_empty() {
             return;
         }
         let reach = bounds.reach();
         let context = self.contexts.len() as u32;
-        self.contexts.push(Context { space, at, boxes: BoxSet::new(&at, reach), instance });
+        let boxes = BoxSet::new(&screen_from_boxes(&space, &at), reach);
+        self.contexts.push(Context { space, at, boxes, instance });
         match space {
             Space::Mesh { .. } => self.visit_node(simd, target, context, Place::new(false, 0)),
             Space::Group(group) => {
@@ -290,7 +300,8 @@ impl<'a> Walk<'a> {
         let c = &self.contexts[entry.context as usize];
         let node = &tree_of(c, entry.place.is_moving()).nodes[entry.place.node()];
         let bounds = node.bounds_of(entry.place.0 as usize % 16);
-        target.hides_outline(simd, &c.at, [bounds.min, bounds.max], rect_of(entry), entry.depth)
+        let at = screen_from_boxes(&c.space, &c.at);
+        target.hides_outline(simd, &at, [bounds.min, bounds.max], rect_of(entry), entry.depth)
     }
 
     #[inline(always)]

@@ -298,17 +298,18 @@ impl Band {
         drawn.patches += 1;
         let count = self.turns.iter().filter(|turn| **turn != 0).count();
         drawn.faces += count as u64;
-        let by_outline = !(clear || standing.plain || jointly)
-            && is_fine(self.around_clipped(faces, placing.slack, standing.size), count, PX_A_CLIPPED_FACE);
+        let around = (!(clear || standing.plain || jointly))
+            .then(|| self.around_clipped(faces, placing.slack, standing.size))
+            .filter(|rect| is_fine(*rect, count, PX_A_CLIPPED_FACE));
         // Faces that are filled one by one have depths of their own.
-        let may = by_outline || jointly || (standing.plain && patch.fine.is_some());
+        let may = around.is_some() || jointly || (standing.plain && patch.fine.is_some());
         let apart = if may { apart(standing, patch, pass) } else { Apart::Not };
         let parts = self.take_apart(faces, apart, false);
         for part in 0..parts {
             if parts > 1 {
                 self.parts.choose(part, &mut self.turns);
             }
-            self.draw_turned(simd, standing, faces, placing.slack, by_outline, margin_px);
+            self.draw_turned(simd, faces, placing.slack, around, margin_px);
         }
     }
 
@@ -362,19 +363,18 @@ impl Band {
         })
     }
 
-    /// Draws the faces of a patch that have a turn, placed or clipped.
+    /// Draws the faces of a patch that have a turn, placed or clipped: by their outline, if all that it may touch of the
+    /// image is given.
     #[inline(always)]
     fn draw_turned<S: Simd>(
         &mut self,
         simd: S,
-        standing: &Standing,
         faces: &[Face],
         slack: i32,
-        by_outline: bool,
+        around: Option<[i32; 4]>,
         margin_px: i32,
     ) {
-        if by_outline {
-            let rect = self.around_clipped(faces, slack, standing.size);
+        if let Some(rect) = around {
             let Some(rect) = self.rows_of(rect) else { return };
             if self.clipped_mosaic(simd, faces, rect, slack) {
                 return;

@@ -476,3 +476,32 @@ fn a_wall_that_fills_the_view_hides_whatever_it_is_made_of() {
         assert_eq!(found.visible, [3, 0], "{cells}");
     }
 }
+
+/// A thousand bolts close behind a wall, in a plant's coordinates and in a country's.
+#[test]
+fn small_things_far_from_the_origin_take_no_more_questions() {
+    let asked_at = |origin: DVec3| {
+        let mut scene = Scene::new("bolts");
+        scene.meshes.push(unit_cube());
+        let mut random = trouble::Random::new(9);
+        let mut place = |at: DVec3, size: DVec3| {
+            let local = DAffine3::from_scale_rotation_translation(size, DQuat::IDENTITY, origin + at);
+            let local = Transform::Affine(local);
+            let node = Node { name: String::new(), parent: None, local, content: Content::Mesh(0) };
+            scene.groups[0].push(node);
+        };
+        place(DVec3::new(0.0, 0.0, -5.0), DVec3::new(8.0, 8.0, 0.1));
+        for _ in 0..1000 {
+            let at = DVec3::new(random.between(-3.0, 3.0), random.between(-3.0, 3.0), -5.2);
+            place(at, DVec3::splat(0.01));
+        }
+        let index = SceneIndex::build(scene, &IndexOptions::default());
+        let projection = Projection::Perspective { fov_y: 1.0, near: 0.1 };
+        let view = View::look_at(origin, origin + DVec3::NEG_Z, DVec3::Y, projection, (640, 480));
+        let found = Culler::new().cull(&index, &view, &CullOptions::default()).unwrap();
+        assert_eq!(found.visible, [0]);
+        found.counters.boxes_asked
+    };
+    let far = DVec3::new(512_345.6, 30.0, -5_412_345.7);
+    assert!(asked_at(far) < asked_at(DVec3::ZERO) * 2, "{} {}", asked_at(far), asked_at(DVec3::ZERO));
+}

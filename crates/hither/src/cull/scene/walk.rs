@@ -316,7 +316,7 @@ impl<'a> Walk<'a> {
     fn enter(&mut self, group: u32, at: ScreenFromObject, first: u32) {
         let group = &self.index.groups[group as usize];
         let context = self.contexts.len() as u32;
-        let boxes = self.frame.box_view(&at);
+        let boxes = self.frame.box_view(&group.screen_from_trees(&at));
         self.contexts.push(Context { group, at, boxes, first });
         for (tree, moving) in [(&group.moving, true), (&group.resting, false)] {
             if !tree.nodes.is_empty() {

@@ -31,7 +31,7 @@ fn ten_thousand_groups_nest() {
     for tree in KINDS {
         let index = SceneIndex::build(scene.clone(), &IndexOptions { tree });
         let bounds = index.groups[9_999].bounds();
-        assert!(bounds.contains(&Box3 { min: [9_999.0, 0.0, 0.0], max: [10_000.0, 1.0, 0.0] }));
+        assert!(bounds.contains(DVec3::X * 9_999.0) && bounds.contains(DVec3::new(10_000.0, 1.0, 0.0)));
     }
 }
 
@@ -56,5 +56,44 @@ fn a_nested_building_takes_little_memory() {
         let index = SceneIndex::build(scene.clone(), &IndexOptions { tree });
         let module: usize = index.meshes.iter().map(MeshIndex::memory_bytes).sum();
         assert!(index.memory_bytes() - module < 100_000, "{} bytes", index.memory_bytes() - module);
+    }
+}
+
+/// Small things in a country's coordinates, in a group of their own or not, at rest or moved; one is lost far away.
+#[test]
+fn what_lies_together_far_away_has_tight_boxes() {
+    let far = DVec3::new(512_345.6, 30.0, -5_412_345.7);
+    let mut town = Group::default();
+    for i in 0..300 {
+        town.push(shown(Content::Mesh(0), far + Random(i).point(50.0)));
+    }
+    town.push(shown(Content::Mesh(0), DVec3::new(1e9, 0.0, 3e12)));
+    let mut scene = scene_of(mesh_of([[DVec3::ZERO, DVec3::X * 0.01, DVec3::Y * 0.01]]));
+    scene.groups.push(town);
+    scene.root = 1;
+    for tree in KINDS {
+        let mut index = SceneIndex::build(scene.clone(), &IndexOptions { tree });
+        index.validate();
+        let looseness = |index: &SceneIndex| {
+            let group = &index.groups[1];
+            let nodes = group.resting.nodes.iter().chain(&group.moving.nodes);
+            let slots = nodes.flat_map(|node| (0..node.used as usize).map(move |slot| (node, slot)));
+            let leaves = slots.filter(|(node, slot)| {
+                node.child[*slot] != Slot::EMPTY && matches!(node.child[*slot].child(), Child::Leaf(_))
+            });
+            let mut sizes: Vec<f64> =
+                leaves.map(|(node, slot)| node.bounds_of(slot).to_aabb().size().max_element()).collect();
+            assert_eq!(sizes.len(), 301);
+            sizes.sort_by(f64::total_cmp);
+            sizes[299]
+        };
+        assert!(looseness(&index) < 0.0101, "{tree:?}: {}", looseness(&index));
+        for node in 0..100 {
+            let at = far + Random(u64::from(node) + 1000).point(50.0);
+            index.set_transform(node, Transform::from_translation(at));
+        }
+        assert!(looseness(&index) < 0.0101, "{tree:?}, moved: {}", looseness(&index));
+        let bounds = index.groups[1].bounds();
+        assert!(bounds.contains(far) && bounds.contains(DVec3::new(1e9, 0.0, 3e12)));
     }
 }
