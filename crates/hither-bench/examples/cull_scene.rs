@@ -2,7 +2,7 @@
 //!
 //! ```sh
 //! cargo run --release -p hither-bench --example cull_scene -- FILE|world:SPEC WIDTH HEIGHT [sampled] [coherence] [coarse=N]
-//!     [moving] [margin=MM] [occluder=PX] [piece=PX] [face=PX] [pays=FACES] [frames=N] [samples=N] [exact] [camera=NAME]
+//!     [moving] [margin=MM] [occluder=PX] [piece=PX] [face=PX] [pays=FACES] [frames=N] [samples=N] [exact] [ideal=N] [camera=NAME]
 //! ```
 //!
 //! Moving, the eye goes and turns as one who walks at 1.5 m/s and looks around at 30°/s does in 30 frames a second,
@@ -10,16 +10,18 @@
 //! while the answer stays true; then what is seen at pixels' centres from fourteen eyes at that distance counts as missing, too.
 //!
 //! The second line's others are the thresholds of [`CullOptions`], how many frames are timed, samples a pixel each way (4; 0
-//! for none), whether to compare with exact visibility, too, and the only camera.
+//! for none), whether to compare with exact visibility, too, and with an ideal image, and the only camera.
 //!
 //! *Seen* are the instances that are nearest at a pixel's centre, and at one of 4×4 samples a pixel; exactly those of
-//! which `hidden_line` finds a visible face or line (it takes all surfaces for double-sided).
+//! which `hidden_line` finds a visible face or line (it takes all surfaces for double-sided). An ideal image, made of N×N
+//! samples a pixel, holds in each pixel the farthest that is seen there: no image of so many pixels can hide more. It is
+//! asked about boxes around instances, and of those that show about each triangle.
 
-use glam::{DAffine3, DVec3};
-use hither::conventions::View;
+use glam::{DAffine3, DVec2, DVec3};
+use hither::conventions::{Projection, View};
 use hither::cull::{CullOptions, Culler, Meaning};
 use hither::hidden_line::{Drawing, FaceColor, LineOptions, Preparation, PrepareOptions};
-use hither::{IndexOptions, RenderOptions, SceneIndex, render};
+use hither::{IndexOptions, RenderOptions, Scene, SceneIndex, render};
 use std::collections::HashSet;
 use std::error::Error;
 use std::time::Instant;
@@ -40,6 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let is_moving = arguments.iter().any(|a| a == "moving");
     let only = arguments.iter().find_map(|a| a.strip_prefix("camera="));
     let index = SceneIndex::build(scene, &IndexOptions::default());
+    let ideal_by = number_of("ideal", 0)?;
     let exactly = arguments.iter().any(|a| a == "exact");
     let preparation = exactly.then(|| Preparation::new(index.scene(), &PrepareOptions::default()));
     let mut culler = Culler::new();
@@ -88,6 +91,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         if let Some(preparation) = &preparation {
             compare_exactly(preparation, &view, &visible)?;
         }
+        compare_with_ideal(&index, &view, ideal_by)?;
     }
     Ok(())
 }
@@ -149,6 +153,15 @@ fn compare_exactly(
     Ok(())
 }
 
+/// Prints what an ideal image shows, made of so many samples a pixel each way; of none, nothing.
+fn compare_with_ideal(index: &SceneIndex, view: &View, side: u32) -> Result<(), Box<dyn Error>> {
+    if side > 0 {
+        let [boxes, triangles] = Ideal::new(index, view, side)?.shown(index.scene());
+        println!("  an ideal image shows {boxes} by their boxes, {triangles} by their triangles");
+    }
+    Ok(())
+}
+
 /// Instances that are nearest at one of `side` × `side` samples a pixel.
 fn seen(index: &SceneIndex, view: &View, side: u32) -> Result<HashSet<u32>, Box<dyn Error>> {
     let fine = View { width: view.width * side, height: view.height * side, ..*view };
@@ -163,4 +176,73 @@ fn shown(drawing: &Drawing) -> [HashSet<u32>; 2] {
     let lines = drawing.strokes.iter().filter(|stroke| stroke.covers == 0).map(|stroke| stroke.part);
     let all = faces.iter().copied().chain(lines).collect();
     [faces, all]
+}
+
+/// In each pixel the least depth of what is seen there.
+struct Ideal {
+    view: View,
+    least: Vec<f32>,
+}
+
+impl Ideal {
+    fn new(index: &SceneIndex, view: &View, side: u32) -> Result<Ideal, Box<dyn Error>> {
+        let fine = View { width: view.width * side, height: view.height * side, ..*view };
+        let frame = render(index, &fine, &RenderOptions::default())?;
+        let mut least = vec![f32::INFINITY; (view.width * view.height) as usize];
+        for y in 0..fine.height {
+            for x in 0..fine.width {
+                let pixel = &mut least[(y / side * view.width + x / side) as usize];
+                *pixel = pixel.min(frame.depth(x, y));
+            }
+        }
+        Ok(Ideal { view: *view, least })
+    }
+
+    /// How many instances show by the boxes around them, and by their triangles, too.
+    fn shown(&self, scene: &Scene) -> [usize; 2] {
+        let mut counts = [0; 2];
+        for instance in scene.instances() {
+            let (mesh, at) = (&scene.meshes[instance.mesh as usize], instance.world_from_mesh);
+            let bounds = mesh.bounds();
+            let corner = |k: usize| DVec3::from([0, 1, 2].map(|i| [bounds.min, bounds.max][k >> i & 1][i]));
+            if !self.shows((0..8).map(|k| at.transform_point3(corner(k)))) {
+                continue;
+            }
+            counts[0] += 1;
+            let points: Vec<DVec3> =
+                mesh.positions.iter().map(|p| at.transform_point3(p.as_dvec3())).collect();
+            let shows = |t: &[u32; 3]| self.shows(t.map(|corner| points[corner as usize]).into_iter());
+            counts[1] += usize::from(mesh.triangles.iter().any(shows));
+        }
+        counts
+    }
+
+    /// Whether the rectangle around points is somewhere farther than the nearest of them. In perspective.
+    fn shows(&self, points: impl Iterator<Item = DVec3>) -> bool {
+        let Projection::Perspective { near, .. } = self.view.projection else { return true };
+        let half = DVec2::new(self.view.width.into(), self.view.height.into()) * 0.5;
+        let (mut low, mut high, mut nearest, mut beyond) =
+            (DVec2::INFINITY, DVec2::NEG_INFINITY, f64::INFINITY, [true; 5]);
+        for point in points {
+            let p = self.view.view_from_world.transform_point3(point);
+            let q = DVec2::new(p.x, -p.y) * self.view.pixels_per_unit();
+            let border = half * -p.z;
+            let outside = [q.x < -border.x, q.x > border.x, q.y < -border.y, q.y > border.y, -p.z <= near];
+            beyond.iter_mut().zip(outside).for_each(|(all, this)| *all &= this);
+            let on_image = q / -p.z + half;
+            (low, high, nearest) = (low.min(on_image), high.max(on_image), f64::min(nearest, -p.z));
+        }
+        if beyond.contains(&true) {
+            return false;
+        }
+        if nearest <= near {
+            return true;
+        }
+        let pixel = |v: f64, size: u32| (v.max(0.0) as u32).min(size - 1);
+        let columns = pixel(low.x, self.view.width)..=pixel(high.x, self.view.width);
+        let mut rows = pixel(low.y, self.view.height)..=pixel(high.y, self.view.height);
+        // What is seen is not hidden by itself.
+        let depth = (near / nearest * (1.0 - 1e-4)) as f32;
+        rows.any(|y| columns.clone().any(|x| self.least[(y * self.view.width + x) as usize] < depth))
+    }
 }
