@@ -184,6 +184,40 @@ fn coherence_changes_nothing_while_the_eye_moves() {
     }
 }
 
+/// Up to so far that f64 tells no more than an eighth of a metre there.
+#[test]
+fn far_from_the_origin_all_draw_the_same() {
+    let mut covered = [0; 6];
+    for seed in 0..240 {
+        let random = &mut Random::new(77_000 + seed);
+        let (mut scene, mut view) = (trouble::scene(seed), trouble::view(seed));
+        let at = seed as usize % 6;
+        let offset = random.point(1.0).normalize_or(DVec3::X) * [1e3, 1e5, 5.4e6, 1e9, 1e12, 1e15][at];
+        let offset = glam::DAffine3::from_translation(offset);
+        view.view_from_world *= offset.inverse();
+        let root = scene.root as usize;
+        for node in scene.groups[root].nodes.iter_mut().filter(|n| n.parent.is_none()) {
+            node.local = Transform::Affine(offset * node.local.matrix());
+        }
+        let tree = TREES[random.below(3) as usize];
+        let index = SceneIndex::build(scene, &IndexOptions { tree });
+        let truth = render(&index, &view, &plain(Level::new())).unwrap();
+        for box_test in [BoxTest::Rectangle, BoxTest::Definitive] {
+            let options = RenderOptions { box_test, ..RenderOptions::default() };
+            let frame = render(&index, &view, &options).unwrap();
+            assert_eq!(difference(&truth, &frame), None, "seed {seed}, {offset}, {tree:?}, {box_test:?}");
+        }
+        // Nearer, the textbook's z-buffer sees the same but for what rounding moves.
+        let by_the_book = zbuffer::draw(index.scene(), &view);
+        let pixels = || (0..view.height).flat_map(|y| (0..view.width).map(move |x| (x, y)));
+        let seen = pixels().filter(|&(x, y)| truth.id(x, y).is_some()).count();
+        let by_the_book = pixels().filter(|&(x, y)| by_the_book.seen(x, y).is_some()).count();
+        assert!(at > 2 || seen.abs_diff(by_the_book) <= 2 + seen / 100, "seed {seed}: {seen}, {by_the_book}");
+        covered[at] += seen;
+    }
+    assert!(covered.iter().all(|&pixels| pixels > 2_000), "{covered:?}");
+}
+
 /// Options drawn at random; all of them must give the same picture.
 fn any_options(random: &mut Random) -> RenderOptions {
     let levels = levels();

@@ -9,7 +9,7 @@ use super::parts::Primitive;
 use super::poses::Poses;
 use super::refit::Refit;
 use super::tree::{Box3, Child, Slot, WideTree};
-use super::{bvh, octree};
+use super::{bvh, middle_of, octree};
 use crate::geometry::Aabb;
 use crate::raster::ScreenFromObject;
 use crate::scene::{Content, Group};
@@ -90,8 +90,9 @@ impl GroupIndex {
         }
         index.places = vec![Place { moves: false, node: NOWHERE, slot: 0 }; index.items.len()];
         index.at_rest = placed.len();
-        index.middle = middle_of(&placed);
-        let box_of = |(bounds, item): &(Aabb, u32)| Primitive::of_box(&around(bounds, index.middle), *item);
+        index.middle = middle_of(placed.len(), |i| placed[i].0);
+        let box_of =
+            |(bounds, item): &(Aabb, u32)| Primitive::of_box(&Box3::about(bounds, index.middle), *item);
         index.resting = tree_of_items(placed.iter().map(box_of).collect(), kind);
         record_places(&index.resting, &mut index.places, false);
         index
@@ -249,8 +250,7 @@ fn placed_bounds(bounds: &Aabb, transform: &DAffine3) -> Aabb {
         return Aabb::EMPTY;
     }
     let placed = bounds.transformed(transform);
-    // Three products and sums in f64 on either side, and what may be added to bounds and taken from what is placed: 2⁻⁴⁸
-    // of the terms' size covers the roundings.
+    // Three products and sums in f64 on either side: 2⁻⁴⁸ of the terms' size covers both roundings.
     let reach = bounds.min.abs().max(bounds.max.abs());
     let m = transform.matrix3;
     let size = m.x_axis.abs() * reach.x + m.y_axis.abs() * reach.y + m.z_axis.abs() * reach.z;
@@ -260,35 +260,7 @@ fn placed_bounds(bounds: &Aabb, transform: &DAffine3) -> Aabb {
 
 /// The same about the origin of the trees' boxes.
 fn placed_box(bounds: &Aabb, transform: &DAffine3, middle: DVec3) -> Box3 {
-    around(&placed_bounds(bounds, transform), middle)
-}
-
-/// A box about another origin, rounded outwards.
-fn around(bounds: &Aabb, middle: DVec3) -> Box3 {
-    Box3::around(&Aabb { min: bounds.min - middle, max: bounds.max - middle })
-}
-
-/// In f32 a coordinate so many times as large as things are is off by a thousandth of them.
-const FAR: f64 = 8192.0;
-
-/// The origin about which boxes of f32 tell best where things are: their middle, along the axes along which they lie
-/// together and far away, as the houses of a town do in a country's coordinates. Others are best left about zero.
-fn middle_of(placed: &[(Aabb, u32)]) -> DVec3 {
-    let mut numbers = Vec::with_capacity(placed.len());
-    let mut median = |of: &dyn Fn(&Aabb) -> f64| {
-        numbers.clear();
-        numbers.extend(placed.iter().map(|(bounds, _)| of(bounds)).filter(|n| n.is_finite()));
-        let half = numbers.len() / 2;
-        if numbers.is_empty() { 0.0 } else { *numbers.select_nth_unstable_by(half, f64::total_cmp).1 }
-    };
-    let extent = median(&|bounds| bounds.size().max_element());
-    DVec3::from([0, 1, 2].map(|axis| {
-        // With few bits, so that differences are exact.
-        let middle = f64::from(median(&|bounds| bounds.center()[axis]) as f32);
-        let apart = median(&|bounds| (bounds.center()[axis] - middle).abs());
-        let far = middle.abs() > FAR * extent && middle.abs() > 4.0 * apart && middle.is_finite();
-        if far { middle } else { 0.0 }
-    }))
+    Box3::about(&placed_bounds(bounds, transform), middle)
 }
 
 /// A tree whose leaves are the primitives' numbers.

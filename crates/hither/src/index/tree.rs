@@ -113,6 +113,17 @@ impl Box3 {
         }
     }
 
+    /// The same about another origin.
+    pub fn about(b: &Aabb, origin: DVec3) -> Box3 {
+        if origin == DVec3::ZERO || b.is_empty() {
+            return Box3::around(b);
+        }
+        // Differences are rounded to the nearest.
+        let min = (b.min - origin).to_array().map(f64::next_down);
+        let max = (b.max - origin).to_array().map(f64::next_up);
+        Box3::around(&Aabb { min: min.into(), max: max.into() })
+    }
+
     pub fn to_aabb(self) -> Aabb {
         let v = |p: [f32; 3]| DVec3::new(p[0].into(), p[1].into(), p[2].into());
         Aabb { min: v(self.min), max: v(self.max) }

@@ -9,6 +9,9 @@
 //! all boxes of a tree at once. With errors `eₓ` of a numerator, `e_w` of W, and quotient `q`, a screen
 //! coordinate is off by at most `(eₓ + |q|·e_w) / (W − e_w)` plus 4 roundings of `q`; snapping a corner
 //! moves it by at most 1/512 pixel more. Boxes that may reach the near plane cover the whole window.
+//!
+//! Far from the origin rows' constants are what is left of large numbers. What f64 lost of them, on the way to the boxes and
+//! on the way to what is in them, is [`ScreenFromObject::lost`] each.
 
 use super::box_corners::{axes, corners, largest, smallest};
 use super::pyramid::Rect;
@@ -65,6 +68,8 @@ impl BoxSet {
     pub fn new(at: &ScreenFromObject, reach: [f64; 3]) -> BoxSet {
         let mut rows = [at.x, at.y, at.w, at.d];
         let (mut rounded, mut error) = ([[0f32; 4]; 4], [0f32; 4]);
+        let [lost_x, lost_y, lost_third] = at.lost();
+        let lost = [lost_x / 256.0, lost_y / 256.0, lost_third, lost_third];
         for (k, row) in rows.iter_mut().enumerate() {
             for (c, rounded) in row.iter_mut().zip(&mut rounded[k]) {
                 if k < 2 {
@@ -74,7 +79,7 @@ impl BoxSet {
             }
             let [x, y, z, w] = *row;
             let size = x.abs() * reach[0] + y.abs() * reach[1] + z.abs() * reach[2] + w.abs();
-            error[k] = (size * 8.0 / f64::from(1 << 24)) as f32 * 1.000_001;
+            error[k] = (size * 8.0 / f64::from(1 << 24) + lost[k] * 3.0) as f32 * 1.000_001;
         }
         let [x, y, w, d] = rounded;
         // Squares of nothing are taken here; quotients and margins stay below 1e38 under this bound.

@@ -112,10 +112,13 @@ impl Outline {
 /// one lies before the near plane or too far outside.
 fn project(at: &ScreenFromObject, min: [f32; 3], max: [f32; 3], window: Rect) -> Option<Corners> {
     let mut corners = [[0.0; 2]; 8];
+    let [lost_x, lost_y, lost_w] = at.lost();
+    let lost_px = (lost_x.max(lost_y) / 256.0 + REACH_PX * lost_w) * 4.0;
     for (i, corner) in corners.iter_mut().enumerate() {
         let p = [0, 1, 2].map(|k| f64::from(if i >> k & 1 == 0 { min[k] } else { max[k] }));
         let [x, y, w, d] = at.point(p);
-        if !(d <= w && w > 0.0) {
+        // Nor what f64 has lost too much of.
+        if !(d <= w && w > 0.0 && lost_px < w * SLACK_PX * 0.5) {
             return None;
         }
         *corner = [x / w / 256.0 - 0.5 - f64::from(window.left), y / w / 256.0 - 0.5 - f64::from(window.top)];

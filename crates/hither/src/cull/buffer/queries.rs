@@ -6,12 +6,13 @@ use super::{Frame, Margin, Occludee, OcclusionBuffer, PlacedMesh, Verdict};
 use crate::conventions::{Projection, View};
 use crate::cull::Meaning;
 use crate::geometry::Aabb;
-use crate::index::Box3;
+use crate::index::{Box3, middle_of};
 use crate::raster::ScreenFromObject;
 use fearless_simd::{Simd, dispatch};
 use glam::{DAffine3, DVec3};
 
-/// Boxes to ask about, sixteen together. f32, rounded outwards.
+/// Boxes to ask about, sixteen together. f32, rounded outwards, about an origin: boxes that are collected find one, where
+/// they lie together far from the world's, and others are told ([`Boxes::about`]).
 ///
 /// A box with a corner that is no finite number, or beyond 10¹⁵ metres, is never hidden; nor is one whose
 /// smallest coordinates exceed its largest.
@@ -19,6 +20,7 @@ use glam::{DAffine3, DVec3};
 pub struct Boxes {
     pub(super) sixteen: Vec<SixteenBoxes>,
     len: usize,
+    origin: DVec3,
 }
 
 #[derive(Clone, Debug)]
@@ -29,6 +31,20 @@ pub(super) struct SixteenBoxes {
 }
 
 impl Boxes {
+    /// No boxes yet. What is kept of them is kept about `origin`: in a country's coordinates, 5,000 km from the world's
+    /// origin, f32 tells half a metre, and about the middle of a town tenths of a millimetre.
+    pub fn about(origin: DVec3) -> Boxes {
+        Boxes { origin, ..Boxes::default() }
+    }
+
+    /// To the screen from the space in which they are kept.
+    pub(super) fn screen_from_boxes(&self, screen_from_world: &ScreenFromObject) -> ScreenFromObject {
+        match self.origin == DVec3::ZERO {
+            true => *screen_from_world,
+            false => screen_from_world.after(&DAffine3::from_translation(self.origin)),
+        }
+    }
+
     /// Adds a box.
     pub fn push(&mut self, bounds: &Aabb) {
         let lane = self.len % 16;
@@ -36,7 +52,7 @@ impl Boxes {
             self.sixteen.push(SixteenBoxes { min: [[0.0; 16]; 3], max: [[0.0; 16]; 3] });
         }
         self.len += 1;
-        let b = Box3::around(bounds);
+        let b = Box3::about(bounds, self.origin);
         if let Some(sixteen) = self.sixteen.last_mut() {
             for axis in 0..3 {
                 sixteen.min[axis][lane] = b.min[axis];
@@ -69,7 +85,7 @@ impl Boxes {
         self.len == 0
     }
 
-    /// Forgets all.
+    /// Forgets all, but not the origin.
     pub fn clear(&mut self) {
         self.sixteen.clear();
         self.len = 0;
@@ -78,8 +94,9 @@ impl Boxes {
 
 impl FromIterator<Aabb> for Boxes {
     fn from_iter<T: IntoIterator<Item = Aabb>>(bounds: T) -> Boxes {
-        let mut boxes = Boxes::default();
-        bounds.into_iter().for_each(|b| boxes.push(&b));
+        let bounds: Vec<Aabb> = bounds.into_iter().collect();
+        let mut boxes = Boxes::about(middle_of(bounds.len(), |i| bounds[i]));
+        bounds.iter().for_each(|b| boxes.push(b));
         boxes
     }
 }
@@ -281,7 +298,8 @@ impl Frame {
 
     #[inline(always)]
     fn ask_all<S: Simd>(&self, simd: S, bands: &[&Band], boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
-        let (view, widening) = (self.box_view(&self.screen_from_world), self.widening());
+        let screen_from_boxes = boxes.screen_from_boxes(&self.screen_from_world);
+        let (view, widening) = (self.box_view(&screen_from_boxes), self.widening());
         for sixteen in &boxes.sixteen {
             let on_screen = if widening > 0.0 {
                 let wide = sixteen.widened(widening);
@@ -301,8 +319,7 @@ impl Frame {
     }
 
     pub(super) fn ask_box(&self, bands: &[&Band], bounds: &Aabb) -> Verdict {
-        let mut boxes = Boxes::default();
-        boxes.push(bounds);
+        let boxes = Boxes::from_iter([*bounds]);
         let mut verdicts = Vec::with_capacity(16);
         self.ask(bands, &boxes, &mut verdicts);
         verdicts[0]

@@ -177,7 +177,7 @@ impl SampledBuffer {
 
     fn ask_bands(&self, bands: &mut [MutexGuard<Target>], boxes: &Boxes, verdicts: &mut Vec<Verdict>) {
         verdicts.clear();
-        let set = BoxSet::new(&self.screen_from_world, boxes.reach());
+        let set = BoxSet::new(&boxes.screen_from_boxes(&self.screen_from_world), boxes.reach());
         let image = Rect { left: 0, top: 0, right: self.view.width as i32, bottom: self.view.height as i32 };
         dispatch!(self.level, simd => ask(simd, bands, image, &set, boxes, verdicts));
         verdicts.truncate(boxes.len());

@@ -98,6 +98,36 @@ fn nothing_drawn_hides_nothing_wherever_the_eye_is() {
     assert!(visible > 10_000 && outside > 1000, "{visible} visible, {outside} outside");
 }
 
+/// A wall, and bolts close behind it, in a country's coordinates: asked about together, one by one, and as meshes.
+#[test]
+fn small_boxes_far_from_the_origin_are_hidden_as_they_are_at_home() {
+    for origin in [DVec3::ZERO, DVec3::new(512_345.6, 30.0, -5_412_345.7)] {
+        let projection = Projection::Perspective { fov_y: 1.0, near: 0.1 };
+        let view = View::look_at(origin, origin + DVec3::NEG_Z, DVec3::Y, projection, (320, 240));
+        let wall = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [9.0, 9.0, 0.0], [-9.0, 9.0, 0.0]].map(Vec3::from);
+        let (quad, at) = ([[0, 1, 2], [0, 2, 3]], DAffine3::from_translation(origin + DVec3::NEG_Z * 5.0));
+        let wall = Occluder::new(&wall, &quad, Sides::Front).unwrap();
+        let mut buffer = OcclusionBuffer::new(&view, &OcclusionOptions::default()).unwrap();
+        buffer.draw(&wall, &at);
+        let bolt = |x: i32, y: i32| origin + DVec3::new(f64::from(x) * 0.1, f64::from(y) * 0.1, -5.1);
+        let around = |center: DVec3| Aabb { min: center - 0.01, max: center + 0.01 };
+        let bolts: Vec<DVec3> = (-9..10).flat_map(|y| (-9..10).map(move |x| bolt(x, y))).collect();
+        let mut verdicts = Vec::new();
+        buffer.ask(&bolts.iter().map(|center| around(*center)).collect(), &mut verdicts);
+        assert_eq!(verdicts, vec![Verdict::Hidden; bolts.len()]);
+        let mut told = Boxes::about(origin);
+        bolts.iter().for_each(|center| told.push(&around(*center)));
+        buffer.ask(&told, &mut verdicts);
+        assert_eq!(verdicts, vec![Verdict::Hidden; bolts.len()]);
+        let mesh = Occludee::new(&[Vec3::ZERO, Vec3::X * 0.01, Vec3::Y * 0.01], &[[0, 1, 2]]).unwrap();
+        for center in bolts {
+            assert_eq!(buffer.ask_box(&around(center)), Verdict::Hidden, "{center}");
+            let at = DAffine3::from_translation(center);
+            assert_eq!(buffer.ask_mesh(&mesh, &at), Verdict::Hidden, "{center}");
+        }
+    }
+}
+
 /// A scene moved so far from the origin, its eye with it: by its nodes, or by the coordinates of its meshes, which f32
 /// rounds.
 fn moved_away(scene: &mut Scene, view: &mut View, offset: DVec3, in_meshes: bool) {
