@@ -191,18 +191,47 @@ impl GroupIndex {
             });
             motion.refit.set(&mut self.moving, slots);
         }
-        if joined || motion.refit.is_loose() {
-            let primitives = motion.movers.iter().map(|&i| Primitive::of_box(&bounds_now(i), i)).collect();
-            self.moving = tree_of_items(primitives, self.kind);
-            record_places(&self.moving, &mut self.places, true);
-            motion.refit = Refit::new(&self.moving);
-            // They have slots to come back to.
-            let off = motion.movers.iter().filter(|&&i| is_off(i)).map(|&i| (self.places[i as usize], i));
-            let off = off.map(|(place, i)| (place.node, place.slot, Box3::EMPTY, i));
-            motion.refit.set(&mut self.moving, off);
-            motion.refit.settle();
+        let (anew, most) = (joined || motion.refit.is_loose(), moved.len() * 2 > motion.movers.len());
+        if anew || most && self.has_left_its_middle(&content_bounds) {
+            self.build_movers_anew(content_bounds);
         }
         moved.len()
+    }
+
+    /// Whether all have come to where boxes about the origin that suited them tell little.
+    fn has_left_its_middle(&self, content_bounds: impl Fn(Content) -> Aabb) -> bool {
+        let Some(Motion { movers, .. }) = &self.motion else { return false };
+        let about_middle = |mover: usize| {
+            let i = movers[mover] as usize;
+            let Aabb { min, max } =
+                placed_bounds(&content_bounds(self.items[i].content), &self.group_from_content[i]);
+            Aabb { min: min - self.middle, max: max - self.middle }
+        };
+        self.at_rest == 0 && middle_of(movers.len(), about_middle) != DVec3::ZERO
+    }
+
+    /// Builds the tree of what moves anew; if nothing rests, about the origin that suits it now.
+    fn build_movers_anew(&mut self, content_bounds: impl Fn(Content) -> Aabb) {
+        let Some(motion) = &mut self.motion else { return };
+        let placed = motion.movers.iter().map(|&mover| {
+            let i = mover as usize;
+            (placed_bounds(&content_bounds(self.items[i].content), &self.group_from_content[i]), mover)
+        });
+        let placed: Vec<(Aabb, u32)> = placed.collect();
+        if self.at_rest == 0 {
+            self.middle = middle_of(placed.len(), |i| placed[i].0);
+        }
+        let box_of =
+            |(bounds, item): &(Aabb, u32)| Primitive::of_box(&Box3::about(bounds, self.middle), *item);
+        self.moving = tree_of_items(placed.iter().map(box_of).collect(), self.kind);
+        record_places(&self.moving, &mut self.places, true);
+        motion.refit = Refit::new(&self.moving);
+        // They have slots to come back to.
+        let off = motion.movers.iter().filter(|&&i| is_off(&self.group_from_content[i as usize]));
+        let off = off.map(|&i| (self.places[i as usize], i));
+        let off = off.map(|(place, i)| (place.node, place.slot, Box3::EMPTY, i));
+        motion.refit.set(&mut self.moving, off);
+        motion.refit.settle();
     }
 
     /// Asserts that every item is where `group` has it, and in one slot, whose box and all above contain it.

@@ -82,12 +82,11 @@ pub struct Target {
     pub(super) lanes: Option<Box<Lanes>>,
 }
 
-/// Gives a list a length; whatever it holds.
+/// Gives a list a length, and memory that fits; whatever it holds.
 fn fit<T: Copy>(list: &mut Vec<T>, length: usize, value: T) {
-    if list.capacity() < length {
-        list.clear();
+    if list.capacity() < length || list.capacity() / 4 > length {
         // A little more, for windows that grow a little.
-        list.reserve_exact(length + length / 8);
+        *list = Vec::with_capacity(length + length / 8);
     }
     list.resize(length, value);
 }

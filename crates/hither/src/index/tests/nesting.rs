@@ -95,5 +95,12 @@ fn what_lies_together_far_away_has_tight_boxes() {
         assert!(looseness(&index) < 0.0101, "{tree:?}, moved: {}", looseness(&index));
         let bounds = index.groups[1].bounds();
         assert!(bounds.contains(far) && bounds.contains(DVec3::new(1e9, 0.0, 3e12)));
+        // All of it comes to the origin, as the worlds of games do that move with the eye, and goes back.
+        for origin in [DVec3::ZERO, far] {
+            let place = |node: u32| origin + Random(u64::from(node)).point(50.0);
+            let all = (0..301).map(|node| (node, Transform::from_translation(place(node))));
+            index.set_transforms(all);
+            assert!(looseness(&index) < 0.0101, "{tree:?}, {origin}: {}", looseness(&index));
+        }
     }
 }
