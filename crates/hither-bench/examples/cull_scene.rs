@@ -2,7 +2,7 @@
 //!
 //! ```sh
 //! cargo run --release -p hither-bench --example cull_scene -- FILE|world:SPEC WIDTH HEIGHT [sampled] [coherence] [coarse=N]
-//!     [moving] [margin=MM] [occluder=PX] [piece=PX] [face=PX] [pays=FACES] [frames=N] [samples=N] [exact] [ideal=N] [camera=NAME]
+//!     [moving] [margin=MM] [occluder=PX] [piece=PX] [face=PX] [pays=FACES] [frames=N] [samples=N] [exact] [ideal=N] [away=KM] [camera=NAME]
 //! ```
 //!
 //! Moving, the eye goes and turns as one who walks at 1.5 m/s and looks around at 30°/s does in 30 frames a second,
@@ -10,7 +10,8 @@
 //! while the answer stays true; then what is seen at pixels' centres from fourteen eyes at that distance counts as missing, too.
 //!
 //! The second line's others are the thresholds of [`CullOptions`], how many frames are timed, samples a pixel each way (4; 0
-//! for none), whether to compare with exact visibility, too, and with an ideal image, and the only camera.
+//! for none), whether to compare with exact visibility, too, and with an ideal image, how far to the north-east all of it is
+//! moved beforehand, and the only camera.
 //!
 //! *Seen* are the instances that are nearest at a pixel's centre, and at one of 4×4 samples a pixel; exactly those of
 //! which `hidden_line` finds a visible face or line (it takes all surfaces for double-sided). An ideal image, made of N×N
@@ -21,6 +22,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use hither::conventions::{Projection, View};
 use hither::cull::{CullOptions, Culler, Meaning};
 use hither::hidden_line::{Drawing, FaceColor, LineOptions, Preparation, PrepareOptions};
+use hither::scene::Transform;
 use hither::{IndexOptions, RenderOptions, Scene, SceneIndex, render};
 use std::collections::HashSet;
 use std::error::Error;
@@ -30,13 +32,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |i: usize, or: u32| arguments.get(i).and_then(|s| s.parse().ok()).unwrap_or(or);
     let name = arguments.first().ok_or("which scene?")?;
-    let scene = match name.strip_prefix("world:") {
+    let mut scene = match name.strip_prefix("world:") {
         Some(spec) => hither_worlds::generate(spec)?,
         None => hither_io::read(std::path::Path::new(name))?.scene,
     };
     let size = (number(1, 1920), number(2, 1080));
     let number_of = |name: &str, or: u32| number_of(&arguments, name, or);
     let options = options(&arguments)?;
+    move_away(&mut scene, f64::from(number_of("away", 0)?) * 1000.0);
     let sampled = options.meaning == Meaning::Sampled;
     let (samples, frames) = (number_of("samples", 4)?, number_of("frames", 30)?);
     let is_moving = arguments.iter().any(|a| a == "moving");
@@ -94,6 +97,20 @@ fn main() -> Result<(), Box<dyn Error>> {
         compare_with_ideal(&index, &view, ideal_by)?;
     }
     Ok(())
+}
+
+/// Moves the root group's nodes, and cameras that follow none, so many metres along x and against z.
+fn move_away(scene: &mut Scene, metres: f64) {
+    if metres == 0.0 {
+        return;
+    }
+    let offset = DAffine3::from_translation(DVec3::new(metres, 0.0, -metres));
+    let root = scene.root as usize;
+    let nodes = scene.groups[root].nodes.iter_mut().filter(|node| node.parent.is_none());
+    let cameras = scene.cameras.iter_mut().filter(|camera| camera.node.is_none());
+    for local in nodes.map(|node| &mut node.local).chain(cameras.map(|camera| &mut camera.local)) {
+        *local = Transform::Affine(offset * local.matrix());
+    }
 }
 
 /// Views from fourteen eyes that are as far from that of `view` as may be: along the axes, and between them.
