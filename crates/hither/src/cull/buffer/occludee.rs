@@ -74,14 +74,15 @@ impl Occludee {
         let mut of_runs = Vec::new();
         ask(&runs, &mut of_runs);
         let mut verdict = Verdict::Outside;
-        let mut of_triangles = Vec::new();
+        let (mut boxes, mut of_triangles) = (runs.like_these(), Vec::new());
         for ((run, bounds), of_run) in self.triangles.chunks(RUN).zip(&self.runs).zip(of_runs) {
             if of_run == Verdict::Visible {
                 let sizes = stretch(reach(bounds));
                 let around = |t: &[Vec3; 3]| {
                     Aabb::around(t.iter().map(|p| world_from_object.transform_point3(p.as_dvec3())))
                 };
-                let boxes: Boxes = run.iter().map(|t| placed(around(t), sizes)).collect();
+                boxes.clear();
+                run.iter().for_each(|t| boxes.push(&placed(around(t), sizes)));
                 ask(&boxes, &mut of_triangles);
             } else {
                 of_triangles.clear();

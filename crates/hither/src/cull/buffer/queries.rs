@@ -37,6 +37,11 @@ impl Boxes {
         Boxes { origin, ..Boxes::default() }
     }
 
+    /// No boxes yet, about the same origin.
+    pub(super) fn like_these(&self) -> Boxes {
+        Boxes::about(self.origin)
+    }
+
     /// To the screen from the space in which they are kept.
     pub(super) fn screen_from_boxes(&self, screen_from_world: &ScreenFromObject) -> ScreenFromObject {
         match self.origin == DVec3::ZERO {
