@@ -10,8 +10,10 @@
 //! comparison settles all blocks that a rectangle holds whole, and only at its border pixels are looked at. Else pixels
 //! beyond the image hold +∞ and never hold a minimum down.
 
+mod asked;
+
 use super::tile::{
-    BLOCK_COLUMNS, BLOCK_ROWS, COLUMNS, Row, TilePlane, WHOLE, blocks_in, blocks_of, columns_of,
+    BLOCK_COLUMNS, BLOCK_ROWS, COLUMNS, Row, TilePlane, WHOLE, blocks_of, columns_of,
 };
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 
@@ -130,29 +132,6 @@ impl Surface {
     #[inline(always)]
     pub fn tile_min(&self, tile: usize) -> f32 {
         self.min[tile / 16].0[tile % 16]
-    }
-
-    /// Whether a block of 4×4 pixels that columns and rows (inclusive) of a tile meet may hold less than `depth`; for
-    /// certain if the tile is not stale.
-    #[inline(always)]
-    pub fn may_gain<S: Simd>(&self, simd: S, tile: usize, rect: [i32; 4], depth: f32) -> bool {
-        if self.tile_min(tile) >= depth {
-            return false;
-        }
-        match self.kind[tile] {
-            Kind::Empty => true,
-            Kind::Plane => self.plane[tile].min(rect[0], rect[1], rect[2], rect[3]) < depth,
-            Kind::Pixels if self.is_stale[tile] => true,
-            Kind::Blocks | Kind::Pixels => {
-                let farther = f32x16::from_slice(simd, &self.blocks[tile].0).simd_lt(depth).to_bitmask();
-                farther as u32 & blocks_in([rect[0] >> 2, rect[1] >> 2, rect[2] >> 2, rect[3] >> 2]) != 0
-            }
-        }
-    }
-
-    #[inline(always)]
-    pub fn cell_min(&self, x: i32, y: i32) -> f32 {
-        self.cell_min[y as usize * self.cells_x + x as usize]
     }
 
     /// A plane covers all of a tile.
@@ -411,21 +390,6 @@ impl Surface {
         beyond.select(f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, 0.0))
     }
 
-    /// Which tiles of a cell hold something that is not nearer than `depth`, of those that meet `rect`.
-    #[inline(always)]
-    pub fn tiles_beyond<S: Simd>(&self, simd: S, x: i32, y: i32, rect: [i32; 4], depth: f32) -> u32 {
-        let cell = y as usize * self.cells_x + x as usize;
-        if self.cell_min[cell] >= depth {
-            return 0;
-        }
-        let [left, top] = [(rect[0] >> 4) - x * 4, (rect[1] >> 4) - y * 4];
-        let [right, bottom] = [(rect[2] >> 4) - x * 4, (rect[3] >> 4) - y * 4];
-        let columns = (15u32 << left.max(0)) & (15 >> (3 - right.min(3)));
-        let rows = (0xFFFFu32 << (top.max(0) * 4)) & (0xFFFF >> ((3 - bottom.min(3)) * 4));
-        let farther = f32x16::from_slice(simd, &self.min[cell].0).simd_lt(depth).to_bitmask() as u32;
-        farther & ((columns & 15) * 0x1111) & rows
-    }
-
     /// Says that pixels of an open tile were raised, none above `highest`.
     #[inline(always)]
     pub fn raised(&mut self, tile: usize, highest: f32) {
@@ -489,47 +453,6 @@ impl Surface {
         self.set_min(simd, tile, blocks.reduce_min());
     }
 
-    /// As [`Surface::all_nearer`], while minima may be stale (too far: still bounds): those that matter are
-    /// brought up to date.
-    #[inline(always)]
-    pub fn all_nearer_now<S: Simd>(&mut self, simd: S, rect: [i32; 4], depth: f32) -> bool {
-        let [left, top, right, bottom] = rect;
-        if (right >> 4) - (left >> 4) <= 1 && (bottom >> 4) - (top >> 4) <= 1 {
-            return self.tiles_are_nearer_now(simd, rect, depth);
-        }
-        for y in top >> 6..(bottom >> 6) + 1 {
-            for x in left >> 6..(right >> 6) + 1 {
-                if self.cell_min(x, y) > depth {
-                    continue;
-                }
-                let inner =
-                    [left.max(x * 64), top.max(y * 64), right.min(x * 64 + 63), bottom.min(y * 64 + 63)];
-                if !self.tiles_are_nearer_now(simd, inner, depth) {
-                    return false;
-                }
-            }
-        }
-        true
-    }
-
-    #[inline(always)]
-    fn tiles_are_nearer_now<S: Simd>(&mut self, simd: S, rect: [i32; 4], depth: f32) -> bool {
-        let [left, top, right, bottom] = rect;
-        for y in top >> 4..(bottom >> 4) + 1 {
-            for x in left >> 4..(right >> 4) + 1 {
-                let tile = self.tile(x, y);
-                if self.tile_min(tile) > depth {
-                    continue;
-                }
-                self.refresh_tile(simd, tile);
-                if !self.tile_is_nearer(simd, tile, [x, y], rect, depth) {
-                    return false;
-                }
-            }
-        }
-        true
-    }
-
     #[inline(always)]
     fn set_min<S: Simd>(&mut self, simd: S, tile: usize, min: f32) {
         let cell = &mut self.min[tile / 16].0;
@@ -537,110 +460,6 @@ impl Surface {
             cell[tile % 16] = min;
             self.cell_min[tile / 16] = f32x16::from_slice(simd, cell).reduce_min();
         }
-    }
-
-    /// Whether every pixel of `[left, top, right, bottom]` (inclusive, inside the surface) holds more than
-    /// `depth`. Exact.
-    #[inline(always)]
-    pub fn all_nearer<S: Simd>(&self, simd: S, rect: [i32; 4], depth: f32) -> bool {
-        let [left, top, right, bottom] = rect;
-        if (right >> 4) - (left >> 4) <= 1 && (bottom >> 4) - (top >> 4) <= 1 {
-            return self.tiles_are_nearer(simd, rect, depth);
-        }
-        for y in top >> 6..(bottom >> 6) + 1 {
-            for x in left >> 6..(right >> 6) + 1 {
-                if self.cell_min(x, y) > depth {
-                    continue;
-                }
-                let inner =
-                    [left.max(x * 64), top.max(y * 64), right.min(x * 64 + 63), bottom.min(y * 64 + 63)];
-                if !self.tiles_are_nearer(simd, inner, depth) {
-                    return false;
-                }
-            }
-        }
-        true
-    }
-
-    /// Whether nothing in the tiles that a rectangle (inclusive) meets is as near as `depth`.
-    #[inline(always)]
-    pub fn is_behind(&self, [left, top, right, bottom]: [i32; 4], depth: f32) -> bool {
-        for y in top >> 4..(bottom >> 4) + 1 {
-            for x in left >> 4..(right >> 4) + 1 {
-                if self.max[self.tile(x, y)] >= depth {
-                    return false;
-                }
-            }
-        }
-        true
-    }
-
-    #[inline(always)]
-    fn tiles_are_nearer<S: Simd>(&self, simd: S, rect: [i32; 4], depth: f32) -> bool {
-        let [left, top, right, bottom] = rect;
-        for y in top >> 4..(bottom >> 4) + 1 {
-            for x in left >> 4..(right >> 4) + 1 {
-                let tile = self.tile(x, y);
-                if !self.tile_is_nearer(simd, tile, [x, y], rect, depth) {
-                    return false;
-                }
-            }
-        }
-        true
-    }
-
-    /// Whether all that lies of `rect` in a tile holds more than `depth`.
-    #[inline(always)]
-    fn tile_is_nearer<S: Simd>(
-        &self,
-        simd: S,
-        tile: usize,
-        [x, y]: [i32; 2],
-        rect: [i32; 4],
-        depth: f32,
-    ) -> bool {
-        if self.tile_min(tile) > depth {
-            return true;
-        }
-        let (x, y) = (x * 16, y * 16);
-        let inner =
-            [(rect[0] - x).max(0), (rect[1] - y).max(0), (rect[2] - x).min(15), (rect[3] - y).min(15)];
-        match self.kind[tile] {
-            Kind::Empty => false,
-            Kind::Plane => self.plane[tile].min(inner[0], inner[1], inner[2], inner[3]) > depth,
-            Kind::Blocks | Kind::Pixels => self.pixels_are_nearer(simd, tile, inner, depth),
-        }
-    }
-
-    /// As [`Surface::tile_is_nearer`] for columns and rows (inclusive) of a tile of floors and maybe depths.
-    #[inline(always)]
-    fn pixels_are_nearer<S: Simd>(&self, simd: S, tile: usize, rect: [i32; 4], depth: f32) -> bool {
-        let [x0, y0, x1, y1] = rect;
-        let threshold = f32x16::splat(simd, depth);
-        // Asked this way round, a depth that is no number is nearer than nothing.
-        let nearer = f32x16::from_slice(simd, &self.blocks[tile].0).simd_gt(threshold).to_bitmask() as u32;
-        let open = !nearer & blocks_in([x0 >> 2, y0 >> 2, x1 >> 2, y1 >> 2]);
-        if open == 0 {
-            return true;
-        }
-        if self.kind[tile] == Kind::Blocks
-            || open & blocks_in([(x0 + 3) >> 2, (y0 + 3) >> 2, ((x1 + 1) >> 2) - 1, ((y1 + 1) >> 2) - 1]) != 0
-        {
-            return false;
-        }
-        let columns = (0xFFFFu32 << x0) & (0xFFFF >> (15 - x1));
-        for y in y0..y1 + 1 {
-            let columns = columns & columns_of(open >> (y & 12));
-            if columns == 0 {
-                continue;
-            }
-            let row = self.row(simd, tile, y as usize & 15);
-            let nearer = row.simd_gt(threshold).to_bitmask() as u32;
-            if nearer & columns != columns {
-                return false;
-            }
-        }
-        true
     }
 
     /// Depth at a pixel of the surface.
