@@ -36,7 +36,7 @@ const PICTURES: [u64; 6] = [
 const BUFFERS: [u64; 6] = [
     0x3e20_ae6b_0727_5c10,
     0x2a19_735d_835e_7648,
-    0xe311_7388_71b3_aa97,
+    0x9dbf_7d2e_f0bb_9149,
     0xb91f_09ea_eb9c_30a3,
     0x996b_6f82_1d41_f74d,
     0xabc3_1d53_7da6_b562,

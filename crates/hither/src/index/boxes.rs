@@ -22,6 +22,14 @@ pub(crate) fn tree_of_boxes(boxes: &[Box3]) -> WideTree {
     tree
 }
 
+/// Boxes that lie together, at most `size` (a power of two) in each block: their numbers. Empty boxes are left out.
+pub(crate) fn blocks_of_boxes(boxes: &[(Box3, u32)], size: usize) -> Vec<Vec<u32>> {
+    let full = boxes.iter().filter(|(b, _)| !b.is_empty());
+    let mut primitives: Vec<Primitive> = full.map(|(b, number)| Primitive::of_box(b, *number)).collect();
+    let built = bvh::build(&mut primitives, size);
+    built.leaf_start.windows(2).map(|at| built.order[at[0] as usize..at[1] as usize].to_vec()).collect()
+}
+
 /// In f32 a coordinate so many times as large as things are is off by a thousandth of them.
 const FAR: f64 = 8192.0;
 

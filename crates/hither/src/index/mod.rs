@@ -15,7 +15,7 @@ mod refit;
 mod tree;
 
 use crate::geometry::Aabb;
-pub(crate) use boxes::{middle_of, tree_of_boxes};
+pub(crate) use boxes::{blocks_of_boxes, middle_of, tree_of_boxes};
 pub(crate) use group::{GroupIndex, Item};
 pub(crate) use mesh::{BlockTree, MeshIndex};
 pub(crate) use tree::{Box3, Child, Slot, WideNode, WideTree};

@@ -7,11 +7,12 @@ use super::fill::{Corner, Goes, Joint, Outline, fill, first_pixel, last_pixel};
 use super::fine::FinePatch;
 use super::loose::{LooseFaces, Sixteen, fill_one, set_up};
 use super::mosaic::{Area, Drawing, MOST_EDGES, Mosaic};
-use super::occluder::{ENDS, Face, Occluder, Patch};
+use super::occluder::{ENDS, Face, Occluder, Part, Patch};
 use super::parts::{Apart, Parts};
 use super::pass::Pass;
 use super::place::{Placed, Placing, Sizes};
 use super::surface::Surface;
+use super::worth::{PX_A_CLIPPED_FACE, PX_A_FINE_FACE, area_of, bodies, is_fine};
 use super::{Drawn, Margin};
 use crate::cull::queue::NearestFirst;
 use crate::index::{Child, Slot};
@@ -148,7 +149,7 @@ impl Band {
             return;
         }
         self.open.clear();
-        self.visit(simd, standing, 0, drawn);
+        self.visit(simd, standing, 0);
         while let Some(open) = self.open.pop() {
             let hidden = match self.rows_of(open.rect) {
                 Some(rect) => simd.vectorize(
@@ -162,20 +163,23 @@ impl Band {
                 continue;
             }
             match open.slot.child() {
-                Child::Node(node) => self.visit(simd, standing, node, drawn),
-                Child::Leaf(patch) => {
-                    let patch = &standing.occluder.patches[patch as usize];
-                    let Some(bodies) = bodies(standing, patch, &open) else { continue };
-                    let mut next = Pass::first(standing, open);
-                    while let Some(pass) = next {
-                        simd.vectorize(
-                            #[inline(always)]
-                            || self.draw_patch(simd, standing, patch, &pass, bodies, drawn),
-                        );
-                        // Bodies lie beyond all that must be cut.
-                        next = if bodies.is_empty() { pass.after(standing, patch) } else { None };
+                Child::Node(node) => self.visit(simd, standing, node),
+                Child::Leaf(leaf) => match standing.occluder.part(leaf) {
+                    Part::Patch(patch) => self.draw_passes(simd, standing, patch, open, drawn),
+                    Part::Loose(faces) => {
+                        // Those that reach the near plane are patches like others.
+                        let patches = match standing.plain {
+                            true => faces.lanes,
+                            false => simd.vectorize(
+                                #[inline(always)]
+                                || self.draw_loose(simd, standing, faces, drawn),
+                            ),
+                        };
+                        if patches != 0 {
+                            self.open_loose(simd, standing, faces, patches);
+                        }
                     }
-                }
+                },
             }
         }
         simd.vectorize(
@@ -184,29 +188,32 @@ impl Band {
         );
     }
 
-    /// Draws the loose faces of a node, and opens its other children that the image may show.
+    /// Opens the children of a node that the image may show.
     #[inline(always)]
-    fn visit<S: Simd>(&mut self, simd: S, standing: &Standing, number: u32, drawn: &mut Drawn) {
+    fn visit<S: Simd>(&mut self, simd: S, standing: &Standing, number: u32) {
         let node = &standing.occluder.tree.nodes[number as usize];
-        let mut lanes = 0xFFFF >> (16 - node.used);
-        if let (Some(loose), false) = (standing.occluder.loose_of_node[number as usize], standing.plain) {
-            let loose = &standing.occluder.loose[loose as usize];
-            lanes &= !u32::from(loose.lanes);
-            let reach_near = simd.vectorize(
-                #[inline(always)]
-                || self.draw_loose(simd, standing, loose, drawn),
-            );
-            // Those that reach the near plane are patches like others.
-            lanes |= u32::from(reach_near);
-        }
-        if lanes == 0 {
-            return;
-        }
         simd.vectorize(
             #[inline(always)]
             || project_lanes(simd, &standing.boxes, [&node.min, &node.max], 0..node.used, &mut self.boxes),
         );
-        let mut rest = u32::from(self.boxes.inside) & lanes;
+        self.open_lanes(standing, self.boxes.inside, |lane| node.child[lane]);
+    }
+
+    /// Opens faces of a block as patches by themselves.
+    #[inline(never)]
+    fn open_loose<S: Simd>(&mut self, simd: S, standing: &Standing, faces: &LooseFaces, lanes: u16) {
+        let [min, max] = faces.sides();
+        simd.vectorize(
+            #[inline(always)]
+            || project_lanes(simd, &standing.boxes, [&min, &max], 0..16, &mut self.boxes),
+        );
+        self.open_lanes(standing, self.boxes.inside & lanes, |lane| Slot::leaf(faces.patch[lane] as usize));
+    }
+
+    /// Opens what lies in some of the boxes that were projected last.
+    #[inline(always)]
+    fn open_lanes(&mut self, standing: &Standing, lanes: u16, slot: impl Fn(usize) -> Slot) {
+        let mut rest = lanes;
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize;
             rest &= rest - 1;
@@ -214,17 +221,41 @@ impl Band {
             let rect = [boxes.left[lane], boxes.top[lane], boxes.right[lane], boxes.bottom[lane]];
             let clear = boxes.clear >> lane & 1 == 1;
             let extent = (rect[2] - rect[0]).min(rect[3] - rect[1]);
-            if node.child[lane] == Slot::EMPTY || extent < standing.least_px || self.rows_of(rect).is_none() {
+            let slot = slot(lane);
+            if slot == Slot::EMPTY || extent < standing.least_px || self.rows_of(rect).is_none() {
                 continue;
             }
             let (depth, farthest) = (boxes.depth[lane], boxes.farthest[lane]);
-            let open = Open { slot: node.child[lane], rect, depth, farthest, clear };
-            if let Child::Leaf(patch) = open.slot.child()
-                && bodies(standing, &standing.occluder.patches[patch as usize], &open).is_none()
+            let open = Open { slot, rect, depth, farthest, clear };
+            if let Child::Leaf(leaf) = slot.child()
+                && let Part::Patch(patch) = standing.occluder.part(leaf)
+                && bodies(standing, patch, &open).is_none()
             {
                 continue;
             }
             self.open.push(open, open.depth);
+        }
+    }
+
+    /// Draws a patch in as many passes as a margin takes.
+    #[inline(always)]
+    fn draw_passes<S: Simd>(
+        &mut self,
+        simd: S,
+        standing: &Standing,
+        patch: &Patch,
+        open: Open,
+        drawn: &mut Drawn,
+    ) {
+        let Some(bodies) = bodies(standing, patch, &open) else { return };
+        let mut next = Pass::first(standing, open);
+        while let Some(pass) = next {
+            simd.vectorize(
+                #[inline(always)]
+                || self.draw_patch(simd, standing, patch, &pass, bodies, drawn),
+            );
+            // Bodies lie beyond all that must be cut.
+            next = if bodies.is_empty() { pass.after(standing, patch) } else { None };
         }
     }
 
@@ -636,68 +667,11 @@ fn pieces_of(
     clipped.get(*next).filter(|c| c.0 as usize == f).map(|c| c.1)
 }
 
-/// So many faces of a convex body take as long as one that is drawn by itself, more or less.
-const FACES_OF_A_BODY_FOR_ONE: i64 = 16;
-
-/// Of what has this share of the image around it, or more, so many times as many faces are worth drawing: it may be the one
-/// thing that hides all the rest, a hillside, say, as it was scanned.
-const LARGE: i64 = 4;
-const FACES_OF_A_LARGE_ONE: i64 = 8;
-
-/// Smaller boxes hide too little for what it takes to place them.
-const PX_A_FACE_OF_A_BOX: i32 = 32;
-
-/// The convex bodies as which a patch is drawn: itself, if it is one, or, if its pixels are few for its faces, the boxes
-/// inside of it. None stands for its faces; `None` for a patch that is not worth drawing.
-#[inline(always)]
-fn bodies<'a>(standing: &Standing<'a>, patch: &'a Patch, open: &Open) -> Option<&'a [Patch]> {
-    let pixels = area_of(open.rect);
-    let wanted = i64::from(patch.faces) * i64::from(standing.px_a_face);
-    let image = i64::from(standing.size[0]) * i64::from(standing.size[1]);
-    let least = if pixels * LARGE >= image && patch.inner.is_empty() {
-        wanted / FACES_OF_A_LARGE_ONE
-    } else {
-        wanted
-    };
-    // Bodies are drawn whole, beyond the near plane of every eye that may come. It is outside of the bounding box, then.
-    let whole = open.clear && !standing.plain && standing.erosion(open.depth).is_some();
-    if whole && patch.convex.is_some() && pixels * FACES_OF_A_BODY_FOR_ONE >= wanted {
-        return Some(std::slice::from_ref(patch));
-    }
-    if pixels >= least {
-        return Some(&[]);
-    }
-    let inner = &standing.occluder.inner[patch.inner.start as usize..patch.inner.end as usize];
-    // Three faces of a box are seen.
-    let faces = 3 * inner.len() as i64;
-    let worth = pixels >= faces * i64::from(standing.px_a_face.max(PX_A_FACE_OF_A_BOX));
-    (whole && faces > 0 && worth).then_some(inner)
-}
-
 /// An orthographic depth is kept no more than that below the true one, and a share of it: see [`Placing::depth`].
 pub(super) const DEPTH_IS_LESS: f64 = 4e-6;
 
 /// The surface ends at every edge of a face, as far as the face knows.
 const ALL: u32 = 15;
-
-/// Pixels in a rectangle (inclusive).
-#[inline(always)]
-fn area_of([left, top, right, bottom]: [i32; 4]) -> i64 {
-    i64::from(right - left + 1) * i64::from(bottom - top + 1)
-}
-
-/// Whether a patch that touches `rect` is better drawn by its outline than face by face.
-fn is_fine(rect: [i32; 4], faces: usize, px_a_face: i64) -> bool {
-    area_of(rect) <= px_a_face * faces as i64
-}
-
-/// Pixels in the rectangle around a patch for each of its faces up to which it is drawn by its outline. Beyond that,
-/// faces bound each other's depth too loosely, and large ones cost less tile by tile.
-const PX_A_FINE_FACE: i64 = 128;
-
-/// The same, of what is left where the patch was clipped. It has a few faces near the eye that are larger by far than
-/// the rest; filling the rest tile by tile is what would cost.
-const PX_A_CLIPPED_FACE: i64 = 1024;
 
 /// The turn of a face whose corners are placed, or 0 if it is not drawn.
 #[inline(always)]

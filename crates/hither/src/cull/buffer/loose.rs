@@ -19,17 +19,19 @@ use super::occluder::{Face, Patch, Vertices};
 use super::place::{Placing, ROUND, dot};
 use super::surface::Surface;
 use super::tile::{COLUMNS, tile_plane};
-use crate::index::{Child, Slot, WideTree};
+use crate::index::Box3;
 use crate::raster::{GUARD_MAX, GUARD_MIN, ScreenFromObject};
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*};
 
-/// The loose faces among the children of a node of an occluder's tree.
+/// At most sixteen loose faces that lie together.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct LooseFaces {
     /// `corner[k][axis][lane]`; of a triangle the last is corner 2 again.
     corner: [[[f32; 16]; 3]; 4],
-    /// Children of the node that are loose faces.
+    /// Of each face the patch that it is.
+    pub patch: [u32; 16],
+    /// Lanes that hold a face.
     pub lanes: u16,
     two_sided: u16,
     /// Faces of four corners.
@@ -37,33 +39,35 @@ pub(super) struct LooseFaces {
 }
 
 impl LooseFaces {
-    /// Those of each node, and for each node the number of its own, or none.
-    pub fn of_tree(
-        tree: &WideTree,
-        patches: &[Patch],
-        faces: &[Face],
-        vertices: &Vertices,
-    ) -> (Vec<LooseFaces>, Vec<Option<u32>>) {
-        let mut all = Vec::new();
-        let of_node = tree.nodes.iter().map(|node| {
-            let mut loose = LooseFaces { corner: [[[0.0; 16]; 3]; 4], lanes: 0, two_sided: 0, quads: 0 };
-            for lane in 0..node.used as usize {
-                if node.child[lane] == Slot::EMPTY {
-                    continue;
-                }
-                let Child::Leaf(patch) = node.child[lane].child() else { continue };
-                let patch = &patches[patch as usize];
-                if patch.faces == 1 {
-                    loose.set(lane, &faces[patch.first_face as usize], vertices, patch.first_vertex);
-                }
-            }
-            (loose.lanes != 0).then(|| {
-                all.push(loose);
-                all.len() as u32 - 1
-            })
-        });
-        let of_node = of_node.collect();
-        (all, of_node)
+    /// Those of some patches of one face, at most sixteen.
+    pub fn new(numbers: &[u32], patches: &[Patch], faces: &[Face], vertices: &Vertices) -> LooseFaces {
+        let corner = [[[0.0; 16]; 3]; 4];
+        let mut loose = LooseFaces { corner, patch: [0; 16], lanes: 0, two_sided: 0, quads: 0 };
+        for (lane, &number) in numbers.iter().enumerate() {
+            let patch = &patches[number as usize];
+            loose.patch[lane] = number;
+            loose.set(lane, &faces[patch.first_face as usize], vertices, patch.first_vertex);
+        }
+        loose
+    }
+
+    /// The smallest coordinates of each face (axis, lane), and the largest.
+    pub fn sides(&self) -> [[[f32; 16]; 3]; 2] {
+        let [a, b, c, d] = &self.corner;
+        let of = |pick: fn(f32, f32) -> f32| {
+            let of_lane = |axis: usize, lane: usize| {
+                pick(pick(a[axis][lane], b[axis][lane]), pick(c[axis][lane], d[axis][lane]))
+            };
+            std::array::from_fn(|axis| std::array::from_fn(|lane| of_lane(axis, lane)))
+        };
+        [of(f32::min), of(f32::max)]
+    }
+
+    /// The box around all.
+    pub fn bounds(&self) -> Box3 {
+        let [low, high] = self.sides();
+        let of_lane = |lane: usize| Box3 { min: low.map(|a| a[lane]), max: high.map(|a| a[lane]) };
+        (0..16).filter(|lane| self.lanes >> lane & 1 == 1).fold(Box3::EMPTY, |b, lane| b.union(&of_lane(lane)))
     }
 
     fn set(&mut self, lane: usize, face: &Face, vertices: &Vertices, first: u32) {
@@ -88,7 +92,7 @@ struct Bounds {
     per_row: [[f32; 16]; 4],
 }
 
-/// Sixteen faces on the screen, ready to be filled; kept from node to node.
+/// Sixteen faces on the screen, ready to be filled; kept from block to block.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct Sixteen {
@@ -144,7 +148,7 @@ struct Eight<S: Simd> {
     d: [f64x8<S>; 4],
 }
 
-/// Sets up the loose faces of a node; those that touch fewer columns or rows than are worth it, and one more, are left
+/// Sets up the faces of a block; those that touch fewer columns or rows than are worth it, and one more, are left
 /// out. With a margin all are eroded by what moves the nearest.
 #[inline(always)]
 pub(super) fn set_up<S: Simd>(simd: S, faces: &LooseFaces, standing: &Standing, out: &mut Sixteen) -> Sorted {

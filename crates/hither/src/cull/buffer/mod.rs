@@ -113,6 +113,7 @@ mod sampled;
 mod shared;
 mod surface;
 mod tile;
+mod worth;
 
 pub(super) use ask::{BoxView, BoxesOnScreen, project_lanes};
 pub(super) use draw::Band;

@@ -5,7 +5,7 @@
 //! 2. pair edges that run in opposite directions, those that share indices before those that share positions
 //! 3. patches: what is connected by pairs
 //! 4. two triangles that are nearly coplanar and form a convex quadrilateral become one face
-//! 5. lay out patch by patch, and sort the patches into a tree of boxes
+//! 5. lay out patch by patch, and sort the patches into a tree of boxes, those of one face sixteen together
 //! 6. find large boxes inside the closed patches of many faces
 //! ```
 //!
@@ -17,7 +17,7 @@ use super::fine::{Fine, FineFaces};
 use super::inner::inner_boxes;
 use super::loose::LooseFaces;
 use super::parts::folds;
-use crate::index::{Box3, WideTree, tree_of_boxes};
+use crate::index::{Box3, WideTree, blocks_of_boxes, tree_of_boxes};
 use crate::scene::{AlphaMode, Material, Mesh};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -54,17 +54,24 @@ pub struct Occluder {
     pub(super) vertices: Vertices,
     pub(super) faces: Vec<Face>,
     pub(super) patches: Vec<Patch>,
+    /// Its leaves are patches, but for those of one face, and after them the blocks of such.
     pub(super) tree: WideTree,
     /// Largest magnitudes of its coordinates.
     pub(super) reach: [f64; 3],
-    /// For each node of the tree the place in `loose` of its faces that are patches by themselves.
-    pub(super) loose_of_node: Vec<Option<u32>>,
+    /// Faces that are patches by themselves, in blocks.
     pub(super) loose: Vec<LooseFaces>,
     pub(super) fine: FineFaces,
     pub(super) convex: Vec<ConvexBody>,
     /// Boxes inside closed patches, each a patch without faces of its own.
     pub(super) inner: Vec<Patch>,
     triangles: usize,
+}
+
+/// What an occluder's tree has for leaves.
+#[derive(Clone, Copy)]
+pub(super) enum Part<'a> {
+    Patch(&'a Patch),
+    Loose(&'a LooseFaces),
 }
 
 /// Positions, patch by patch, each patch filled up to a multiple of eight.
@@ -157,6 +164,14 @@ impl Occluder {
         self.patches.len()
     }
 
+    /// What a leaf of its tree is.
+    pub(super) fn part(&self, leaf: u32) -> Part<'_> {
+        match (leaf as usize).checked_sub(self.patches.len()) {
+            None => Part::Patch(&self.patches[leaf as usize]),
+            Some(block) => Part::Loose(&self.loose[block]),
+        }
+    }
+
     /// Whether it can hide nothing.
     pub fn is_empty(&self) -> bool {
         self.patches.is_empty()
@@ -168,7 +183,6 @@ impl Occluder {
             + size_of_val(self.faces.as_slice())
             + size_of_val(self.patches.as_slice())
             + size_of_val(self.tree.nodes.as_slice())
-            + size_of_val(self.loose_of_node.as_slice())
             + size_of_val(self.loose.as_slice())
             + self.fine.memory_bytes()
             + size_of_val(self.convex.as_slice())
@@ -376,11 +390,25 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
         boxes.push(bounds);
     }
     add_inner_boxes(&mut occluder);
+    add_tree(&mut occluder, boxes);
+    occluder
+}
+
+/// Sorts the patches, given the boxes around them: those of one face into blocks, and these and the others into a tree.
+fn add_tree(occluder: &mut Occluder, mut boxes: Vec<Box3>) {
+    let mut loose = Vec::new();
+    for (number, (patch, bounds)) in occluder.patches.iter().zip(&mut boxes).enumerate() {
+        if patch.faces == 1 {
+            loose.push((std::mem::replace(bounds, Box3::EMPTY), number as u32));
+        }
+    }
+    for block in blocks_of_boxes(&loose, 16) {
+        let block = LooseFaces::new(&block, &occluder.patches, &occluder.faces, &occluder.vertices);
+        boxes.push(block.bounds());
+        occluder.loose.push(block);
+    }
     occluder.tree = tree_of_boxes(&boxes);
     occluder.reach = occluder.tree.bounds().reach();
-    (occluder.loose, occluder.loose_of_node) =
-        LooseFaces::of_tree(&occluder.tree, &occluder.patches, &occluder.faces, &occluder.vertices);
-    occluder
 }
 
 /// Keeps the last patch as a convex body, if it is one.
