@@ -365,4 +365,30 @@ mod tests {
         }
         assert!(less > 30, "{less}");
     }
+
+    /// How many nodes lie below each other.
+    fn depth(part: &Part) -> usize {
+        match part {
+            Part::Leaf { .. } => 0,
+            Part::Node { parts, .. } => 1 + parts.iter().map(depth).max().unwrap_or(0),
+        }
+    }
+
+    #[test]
+    fn lopsided_halves_are_no_deeper_than_a_small_stack() {
+        // Ever smaller steps along each axis, and boxes that hold nearly the same: each cut takes off a little.
+        let steps = (0..120_000u32).map(|i| {
+            let at = Vec3::from([0, 1, 2].map(|axis| (-((i + axis * 83) as f32 % 250.0) / 2.0).exp2()));
+            Primitive::new(at, at, i)
+        });
+        let alike = (0..120_000u32).map(|i| {
+            let at = Vec3::splat(i as f32 * 1e-3);
+            Primitive::new(at - 1e9, at + 1e9, i)
+        });
+        let small = rayon::ThreadPoolBuilder::new().stack_size(1 << 19).build().unwrap();
+        for mut primitives in [steps.collect::<Vec<_>>(), alike.collect()] {
+            let deep = small.install(|| depth(&part(&mut primitives, 1)));
+            assert!((2..200).contains(&deep), "{deep}");
+        }
+    }
 }
