@@ -1,5 +1,7 @@
 //! Which boxes are truly hidden, by 4×4 samples a pixel: a box is seen if at one sample its front is at least as
-//! near as the nearest surface.
+//! near as the nearest surface. And which would be found hidden by an ideal image, which holds in each pixel the
+//! farthest of its samples: asked about rectangles and the nearest depth in them, as buffers are, no conservative one of
+//! so many pixels hides more.
 
 use glam::DVec3;
 use hither::SceneIndex;
@@ -10,20 +12,29 @@ use hither::render::{Frame, RenderOptions, render};
 /// Samples along each side of a pixel.
 const SIDE: u32 = 4;
 
-/// For each box whether no sample shows it.
-pub(super) fn hidden(index: &SceneIndex, view: &View, boxes: &[Aabb]) -> Result<Vec<bool>, String> {
+/// What is so of a box.
+pub(super) struct Truth {
+    /// No sample shows it.
+    pub is_hidden: bool,
+    /// Nor does an ideal image.
+    pub is_found: bool,
+}
+
+/// The truth about each box.
+pub(super) fn of_boxes(index: &SceneIndex, view: &View, boxes: &[Aabb]) -> Result<Vec<Truth>, String> {
     let fine = View { width: view.width * SIDE, height: view.height * SIDE, ..*view };
     let frame = render(index, &fine, &RenderOptions::default()).map_err(|e| e.to_string())?;
     let depths = Depths::new(&frame);
-    Ok(boxes.iter().map(|b| !depths.shows(b)).collect())
+    Ok(boxes.iter().map(|b| depths.truth_about(b)).collect())
 }
 
-/// Distances along the view axis, and for each block of samples the farthest.
+/// Distances along the view axis, and for each block of samples, and for each pixel, the farthest.
 struct Depths {
     view: View,
     distance: Vec<f32>,
     farthest: Vec<f32>,
     columns: usize,
+    ideal: Vec<f32>,
 }
 
 const BLOCK: usize = 16;
@@ -37,19 +48,35 @@ impl Depths {
             distance.extend((0..view.width).map(|x| frame.distance(x, y) as f32));
         }
         let columns = width.div_ceil(BLOCK);
-        let mut farthest = vec![0.0f32; columns * height.div_ceil(BLOCK)];
-        for y in 0..height {
-            for x in 0..width {
-                let block = &mut farthest[y / BLOCK * columns + x / BLOCK];
-                *block = block.max(distance[y * width + x]);
+        let farthest_of = |side: usize| {
+            let columns = width.div_ceil(side);
+            let mut farthest = vec![0.0f32; columns * height.div_ceil(side)];
+            for (y, row) in distance.chunks_exact(width).enumerate() {
+                for (x, distance) in row.iter().enumerate() {
+                    let block = &mut farthest[y / side * columns + x / side];
+                    *block = block.max(*distance);
+                }
             }
-        }
-        Depths { view, distance, farthest, columns }
+            farthest
+        };
+        let (farthest, ideal) = (farthest_of(BLOCK), farthest_of(SIDE as usize));
+        Depths { view, distance, farthest, columns, ideal }
     }
 
-    fn shows(&self, b: &Aabb) -> bool {
+    fn truth_about(&self, b: &Aabb) -> Truth {
+        let Some((rect, nearest)) = self.place(b) else { return Truth { is_hidden: true, is_found: true } };
+        let is_hidden = !self.shows_in(b, rect, nearest);
+        Truth { is_hidden, is_found: is_hidden && !self.ideal_shows(rect, nearest) }
+    }
+
+    /// The rectangle of samples around a box, and no more than the distance of its nearest point; nothing for what is
+    /// before the near plane.
+    fn place(&self, b: &Aabb) -> Option<([f64; 4], f64)> {
         let view = &self.view;
-        let Projection::Perspective { near, .. } = view.projection else { return true };
+        let (w, h) = (f64::from(view.width), f64::from(view.height));
+        let Projection::Perspective { near, .. } = view.projection else {
+            return Some(([0.0, 0.0, w, h], 0.0));
+        };
         let corners = (0..8).map(|k| {
             let pick = |bit: usize, low: f64, high: f64| if k >> bit & 1 == 0 { low } else { high };
             let p =
@@ -58,11 +85,10 @@ impl Depths {
         });
         let corners: Vec<DVec3> = corners.collect();
         if corners.iter().all(|p| -p.z < near) {
-            return false;
+            return None;
         }
         let crosses = corners.iter().any(|p| -p.z < near);
         let scale = view.pixels_per_unit();
-        let (w, h) = (f64::from(view.width), f64::from(view.height));
         let mut rect = [0.0, 0.0, w, h];
         let mut nearest = near;
         if !crosses {
@@ -76,7 +102,16 @@ impl Depths {
             ];
             nearest = corners.iter().map(|p| -p.z).fold(f64::INFINITY, f64::min);
         }
-        self.shows_in(b, rect, nearest)
+        Some((rect, nearest))
+    }
+
+    /// Whether a pixel that a rectangle meets holds something that is not nearer.
+    fn ideal_shows(&self, [left, top, right, bottom]: [f64; 4], nearest: f64) -> bool {
+        let (width, height) = (self.view.width / SIDE, self.view.height / SIDE);
+        let pixel = |v: f64, size: u32| ((v / f64::from(SIDE)).max(0.0) as u32).min(size - 1);
+        let columns = pixel(left, width)..=pixel(right, width);
+        let mut rows = pixel(top, height)..=pixel(bottom, height);
+        rows.any(|y| columns.clone().any(|x| f64::from(self.ideal[(y * width + x) as usize]) >= nearest))
     }
 
     /// Whether a sample in a rectangle shows a box that is nowhere nearer than `nearest`.

@@ -222,15 +222,20 @@ impl Band {
             let clear = boxes.clear >> lane & 1 == 1;
             let extent = (rect[2] - rect[0]).min(rect[3] - rect[1]);
             let slot = slot(lane);
-            if slot == Slot::EMPTY || extent < standing.least_px || self.rows_of(rect).is_none() {
+            if slot == Slot::EMPTY || self.rows_of(rect).is_none() {
                 continue;
             }
             let (depth, farthest) = (boxes.depth[lane], boxes.farthest[lane]);
             let open = Open { slot, rect, depth, farthest, clear };
-            if let Child::Leaf(leaf) = slot.child()
-                && let Part::Patch(patch) = standing.occluder.part(leaf)
-                && bodies(standing, patch, &open).is_none()
-            {
+            let is_small = extent < standing.least_px;
+            let is_left_out = match slot.child() {
+                Child::Leaf(leaf) if let Part::Patch(patch) = standing.occluder.part(leaf) => {
+                    is_small || bodies(standing, patch, &open).is_none()
+                }
+                // Loose faces in it may be larger beyond the border; whether they are is asked of each.
+                _ => is_small && boxes.uncut >> lane & 1 == 1,
+            };
+            if is_left_out {
                 continue;
             }
             self.open.push(open, open.depth);

@@ -67,7 +67,9 @@ impl LooseFaces {
     pub fn bounds(&self) -> Box3 {
         let [low, high] = self.sides();
         let of_lane = |lane: usize| Box3 { min: low.map(|a| a[lane]), max: high.map(|a| a[lane]) };
-        (0..16).filter(|lane| self.lanes >> lane & 1 == 1).fold(Box3::EMPTY, |b, lane| b.union(&of_lane(lane)))
+        (0..16)
+            .filter(|lane| self.lanes >> lane & 1 == 1)
+            .fold(Box3::EMPTY, |b, lane| b.union(&of_lane(lane)))
     }
 
     fn set(&mut self, lane: usize, face: &Face, vertices: &Vertices, first: u32) {

@@ -12,9 +12,7 @@
 
 mod asked;
 
-use super::tile::{
-    BLOCK_COLUMNS, BLOCK_ROWS, COLUMNS, Row, TilePlane, WHOLE, blocks_of, columns_of,
-};
+use super::tile::{BLOCK_COLUMNS, BLOCK_ROWS, COLUMNS, Row, TilePlane, WHOLE, blocks_of, columns_of};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 
 /// How a tile is kept.

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 mod asked;
 mod far;
+mod loose;
 mod moving;
 mod parts;
 mod sampled;
