@@ -4,7 +4,7 @@
 //! A range of primitives is split in two again and again until its parts are leaves [Wald 2007 for the binning]. Leaves
 //! are sets of at most `leaf_size` primitives that are drawn together, so the heuristic counts *blocks* of that size,
 //! not primitives. Of the halvings those become nodes of sixteen slots whose surfaces together are least, as a node
-//! costs the same however few of its slots are used [Ylitie, Karras & Laine 2017, §3.2]: for each range and number of slots,
+//! costs the same however few of its slots are used [Ylitie, Karras & Laine 2017]: for each range and number of slots,
 //! what its own halves cost with so many between them. Deterministic for any number of threads.
 
 use super::parts::{Built, Growing, Part, Primitive, bounds_of};
