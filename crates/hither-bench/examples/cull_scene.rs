@@ -141,7 +141,10 @@ fn options(arguments: &[String]) -> Result<CullOptions, std::num::ParseIntError>
         eye_moves: f64::from(number_of("margin", 0)?) * 0.001,
         meaning: if is_said("sampled") { Meaning::Sampled } else { Meaning::Continuous },
         coherence: is_said("coherence"),
-        coarseness: number_of("coarse", default.coarseness)?,
+        coarseness: match number_of("coarse", 0)? {
+            0 => None,
+            n => Some(n),
+        },
         least_occluder_px: number_of("occluder", default.least_occluder_px)?,
         least_piece_px: number_of("piece", default.least_piece_px)?,
         least_px_a_face: number_of("face", default.least_px_a_face)?,

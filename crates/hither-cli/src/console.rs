@@ -58,16 +58,18 @@ impl Verbosity {
         }
     }
 
-    /// A bar for `steps` steps, visible on a terminal only.
+    /// A bar for `steps` steps, of which each may take long; visible on a terminal only.
     pub fn bar(self, steps: u64, what: &'static str) -> ProgressBar {
         if !self.shows_progress() {
             return ProgressBar::hidden();
         }
         let bar = ProgressBar::new(steps);
-        if let Ok(style) = ProgressStyle::with_template("{prefix} {bar:40} {pos}/{len} {msg} {eta}") {
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix} {bar:40} {pos}/{len} {msg} {eta}")
+        {
             bar.set_style(style);
         }
         bar.set_prefix(what);
+        bar.enable_steady_tick(Duration::from_millis(100));
         bar
     }
 

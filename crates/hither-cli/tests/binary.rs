@@ -63,6 +63,8 @@ fn a_wrong_command_line_is_code_2() {
     refused(&["info"], 2, &["SCENE"]);
     refused(&["info", ""], 2, &["empty"]);
     refused(&["world", "office"], 2, &["-o"]);
+    refused(&["world", "--json", "-"], 2, &["--json", "-o"]);
+    refused(&["layers", WORLD, "--shade", "depth", "-o", "x.ora"], 2, &["--shade depth"]);
     refused(&["world", "office", "-o", "office.obj"], 2, &["office.obj", ".glb"]);
     assert!(!Path::new("x.png").exists());
 }

@@ -100,6 +100,11 @@ fn a_report_says_all_that_the_answer_and_its_time_depend_on() {
         Value::from(all)
     };
     assert_eq!(of(&["--coherence", "--coarse", "2"]), json!([0.0, 2, true, null, null, null, null, 1]));
+    // More than a million pixels are culled by twos.
+    let coarse_of = |more: &[&str]| {
+        report(&[&["cull", "world:tetra", "--size", "1920x1080"], more].concat())["coarse"].clone()
+    };
+    assert_eq!([coarse_of(&[]), coarse_of(&["--coarse", "1"]), coarse_of(&["--sampled"])], [2, 1, 1]);
     assert_eq!(of(&["--method", "exact"]), json!([0.0, 1, false, null, null, null, null, 1]));
     let planes = |more: &[&str]| of(&[&["--method", "planes"], more].concat());
     assert_eq!(planes(&[]), json!([0.0, 1, false, false, "auto", "auto", false, 1]));

@@ -49,7 +49,7 @@ fn scene_culling_leaves_out_nothing_that_shows() {
                 usual,
                 CullOptions { coherence: true, ..usual },
                 CullOptions { coherence: true, least_occluder_px: 0, least_piece_px: 0, ..usual },
-                CullOptions { coarseness: 1 + random.below(5), least_occluder_px: 0, ..usual },
+                CullOptions { coarseness: Some(1 + random.below(5)), least_occluder_px: 0, ..usual },
                 CullOptions { meaning: Meaning::Sampled, least_occluder_px: 0, ..usual },
             ];
             for options in ways {

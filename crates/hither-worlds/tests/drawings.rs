@@ -44,7 +44,11 @@ fn pictures_show_no_more_than_drawings_and_drawings_no_more_than_culling_finds()
                 "{spec}, {view:?}: {missing:?} are in the picture, not in the drawing"
             );
             for coarseness in [1, 1 + random.below(4)] {
-                let options = CullOptions { coarseness, least_occluder_px: 0, ..CullOptions::default() };
+                let options = CullOptions {
+                    coarseness: Some(coarseness),
+                    least_occluder_px: 0,
+                    ..CullOptions::default()
+                };
                 let found = culler.cull(&index, &view, &options).unwrap();
                 let found: HashSet<u32> = found.visible.into_iter().collect();
                 let missing: Vec<u32> = exact.difference(&found).copied().collect();

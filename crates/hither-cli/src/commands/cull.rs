@@ -40,9 +40,10 @@ pub struct Arguments {
     /// Leave out what shows at no pixel's centre, too: for drawing at this very size (method buffer)
     #[arg(long)]
     sampled: bool,
-    /// Cull with pixels N times as wide and high: as true, faster, and leaves out less (method buffer)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64), default_value = "1")]
-    coarse: u32,
+    /// Cull with pixels N times as wide and high: as true, faster, and leaves out less; 2 by default where the size is of
+    /// more than a million pixels, else 1 (method buffer)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    coarse: Option<u32>,
     /// Start each frame with what hid something in the last (method buffer)
     #[arg(long)]
     coherence: bool,
@@ -139,10 +140,10 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.method == MethodName::Exact && arguments.reasons {
         return Err(Failure::usage("--reasons goes with --method buffer or planes"));
     }
-    if !buffer && arguments.coarse > 1 {
+    if !buffer && arguments.coarse.is_some_and(|n| n > 1) {
         return Err(Failure::usage("--coarse goes with --method buffer"));
     }
-    if arguments.sampled && arguments.coarse > 1 {
+    if arguments.sampled && arguments.coarse.is_some_and(|n| n > 1) {
         return Err(Failure::usage("--sampled needs the view's own pixels: it goes without --coarse"));
     }
     if !buffer && (arguments.sampled || arguments.objects_move > 0.0) {
@@ -166,6 +167,18 @@ enum Method {
     Planes(Box<planes::Planes>),
 }
 
+fn cull_options(arguments: &Arguments) -> CullOptions {
+    CullOptions {
+        eye_moves: arguments.margin,
+        objects_move: arguments.objects_move,
+        meaning: if arguments.sampled { Meaning::Sampled } else { Meaning::Continuous },
+        coarseness: arguments.coarse,
+        coherence: arguments.coherence,
+        reasons: arguments.reasons,
+        ..CullOptions::default()
+    }
+}
+
 impl Method {
     fn new(arguments: &Arguments, index: &SceneIndex) -> Method {
         match arguments.method {
@@ -174,16 +187,7 @@ impl Method {
             MethodName::Buffer => {
                 let mut culler = Box::new(Culler::new());
                 culler.prepare(index);
-                let options = CullOptions {
-                    eye_moves: arguments.margin,
-                    objects_move: arguments.objects_move,
-                    meaning: if arguments.sampled { Meaning::Sampled } else { Meaning::Continuous },
-                    coarseness: arguments.coarse,
-                    coherence: arguments.coherence,
-                    reasons: arguments.reasons,
-                    ..CullOptions::default()
-                };
-                Method::Buffer(culler, options)
+                Method::Buffer(culler, cull_options(arguments))
             }
         }
     }
@@ -293,6 +297,10 @@ fn frame_json(names: &Names, found: &Found, number: u32, time: Option<f64>, view
 fn settings(arguments: &Arguments, eye: &Eye, index: &SceneIndex) -> Map<String, Value> {
     let scene = index.scene();
     let camera = eye.camera_name(scene).map(|(i, name)| json!({ "index": i, "name": name }));
+    let coarse = match arguments.method {
+        MethodName::Buffer => cull_options(arguments).coarseness_in(arguments.view.size),
+        _ => 1,
+    };
     let mut map = Map::new();
     map.insert("scene".into(), arguments.scene.clone().into());
     map.insert("triangles".into(), scene.instanced_triangle_count().into());
@@ -304,7 +312,7 @@ fn settings(arguments: &Arguments, eye: &Eye, index: &SceneIndex) -> Map<String,
     map.insert("margin".into(), arguments.margin.into());
     map.insert("objects_move".into(), arguments.objects_move.into());
     map.insert("sampled".into(), arguments.sampled.into());
-    map.insert("coarse".into(), arguments.coarse.into());
+    map.insert("coarse".into(), coarse.into());
     map.insert("coherence".into(), arguments.coherence.into());
     map
 }

@@ -98,13 +98,23 @@ struct Layer {
     held_out: u64,
 }
 
+fn check_choices(arguments: &Arguments) -> Result<(), Failure> {
+    if matches!(arguments.shade, ShadeName::Depth) {
+        return Err(Failure::usage(
+            "--shade depth spreads a picture's own distances over its greys, and layers would not fit together: \
+             `hither render` draws it",
+        ));
+    }
+    arguments.layers.check()?;
+    arguments.focus.check()
+}
+
 /// Takes the frames apart that are asked for.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let verbosity = arguments.report.verbosity();
     let to = arguments.report.json.as_deref();
     let format = arguments.output.as_deref().map(Format::of).transpose()?;
-    arguments.layers.check()?;
-    arguments.focus.check()?;
+    check_choices(arguments)?;
     let files = check_outputs(arguments, format)?;
     check_size(arguments)?;
     let mut scene = source::open_surfaces(&arguments.scene, &files, verbosity)?;

@@ -25,6 +25,9 @@ pub struct Arguments {
 /// Writes a world, or lists them.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (Some(name), Some(output)) = (&arguments.name, &arguments.output) else {
+        if arguments.report.json.is_some() {
+            return Err(Failure::usage("--json goes with a world to write: NAME -o FILE.glb"));
+        }
         return console::print(&list());
     };
     if !outputs::has_extension(output, "glb") {

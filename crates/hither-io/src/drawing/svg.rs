@@ -42,7 +42,8 @@ fn write(file: &mut dyn Write, sheet: &Sheet) -> io::Result<()> {
     if !sheet.title.is_empty() {
         writeln!(file, "<title>{}</title>", escaped(sheet.title))?;
     }
-    writeln!(file, "<style>\n{}{}</style>", stylesheet(sheet.unit), sheet.style)?;
+    let style = sheet.style.lines().map(escaped).collect::<Vec<_>>().join("\n");
+    writeln!(file, "<style>\n{}{style}</style>", stylesheet(sheet.unit))?;
     for view in &sheet.views {
         write_view(file, sheet, view)?;
     }

@@ -52,7 +52,7 @@ fn written(write: impl Fn(&Path, &Sheet) -> Result<(), Error>, extension: &str) 
         unit: Unit::Millimetre,
         views: vec![view],
         part_names: &names,
-        style: "",
+        style: "path > .a { stroke: red }\n/* </style> & ]]> */",
     };
     write(&path, &sheet).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
@@ -66,6 +66,10 @@ use std::path::Path;
 #[test]
 fn svg_has_groups_and_classes() {
     let text = written(write_svg, "svg");
+    assert!(
+        text.contains("path &gt; .a { stroke: red }\n/* &lt;/style&gt; &amp; ]]&gt; */</style>\n"),
+        "a stylesheet is text"
+    );
     assert!(text.contains("width=\"50mm\" height=\"30mm\" viewBox=\"0 0 50 30\""), "{text}");
     assert!(text.contains("data-part=\"0\" data-name=\"a&lt;b&gt;&amp;&quot;c&quot;\""));
     assert!(text.contains("<path class=\"visible silhouette\" d=\"M1 2l20 0 0 11\"/>"), "{text}");

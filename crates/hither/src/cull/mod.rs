@@ -18,7 +18,7 @@ pub use buffer::{
     Ball, Boxes, CannotMerge, Drawn, Occludee, Occluder, OccluderError, OcclusionBuffer, OcclusionOptions,
     PlacedMesh, SampledBuffer, ScreenRect, SharedBuffer, Sides,
 };
-pub use scene::{CullCounters, CullOptions, Culler, Culling, Judged, Reason, cull};
+pub use scene::{CullCounters, CullOptions, Culler, Culling, Judged, MANY_PIXELS, Reason, cull};
 
 /// Where something must show to count as seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -36,7 +36,7 @@ pub(crate) struct GroupIndex {
     pub moving: WideTree,
     kind: TreeKind,
     /// Where each item's slot is: in which tree, node and slot.
-    places: Vec<Place>,
+    pub(super) places: Vec<Place>,
     /// Items in `resting`.
     at_rest: usize,
     /// What nothing needs before something moves.
@@ -44,7 +44,7 @@ pub(crate) struct GroupIndex {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Place {
+pub(super) struct Place {
     moves: bool,
     /// `NOWHERE` where there is nothing to be seen.
     node: u32,

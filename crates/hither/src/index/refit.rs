@@ -20,6 +20,9 @@ pub(super) struct Refit {
 /// this many times what they have.
 const LOOSE: f64 = 1.5;
 
+/// But not before one in so many of its leaves has changed: what fewer do to boxes costs a walk less than a new tree.
+const FEW: u64 = 64;
+
 /// And, whatever its boxes, once each of its leaves has changed so often, on average: it may have been built badly, around
 /// something far away that has gone.
 const CHANGES: u64 = 256;
@@ -53,12 +56,12 @@ impl Refit {
     /// something that has gone, and a sum that it went from is no longer known well.
     pub fn is_loose(&self) -> bool {
         let as_built = self.area <= LOOSE * self.built_area && self.area * LOOSE >= self.built_area;
-        !as_built || self.changes > CHANGES * self.leaves
+        !as_built && self.changes * FEW >= self.leaves || self.changes > CHANGES * self.leaves
     }
 
     /// Takes the boxes as they are now for those that the tree was built with.
     pub fn settle(&mut self) {
-        self.built_area = self.area;
+        (self.built_area, self.changes) = (self.area, 0);
     }
 
     /// Gives leaves new boxes: (node, slot, box, leaf). One with an empty box becomes vacant until it gets another.

@@ -31,7 +31,7 @@ fn make(table: &mut Table, options: &Options) -> Result<(), String> {
     let ways = [
         ("", usual),
         ("coherence", CullOptions { coherence: true, ..usual }),
-        ("pixels 4 times as wide", CullOptions { coarseness: 4, ..usual }),
+        ("pixels 4 times as wide", CullOptions { coarseness: Some(4), ..usual }),
         ("margin of 1 cm", CullOptions { eye_moves: 0.01, ..usual }),
     ];
     for camera in ["corridor", "open", "outside"] {

@@ -272,6 +272,8 @@ pub(super) struct Frame {
     moves: f64,
     /// Pixels that a metre at distance 1 covers anywhere in the image.
     pixels_a_metre: f64,
+    /// How many of the whole view's pixels go across and down one of `view`.
+    pub coarseness: u32,
     /// Pixels on each side that are not of the image: what an eye that comes may see there is drawn, too.
     border: u32,
 }
@@ -292,6 +294,7 @@ impl Frame {
             screen_from_world,
             moves: (options.eye_moves + options.objects_move) * view.stretch(),
             pixels_a_metre,
+            coarseness: 1,
             border: 0,
         })
     }
@@ -335,7 +338,7 @@ impl Frame {
         }
         let size = |side: u32| side.div_ceil(n) + 2 * border;
         (self.view.width, self.view.height) = (size(self.view.width), size(self.view.height));
-        self.border = border;
+        (self.coarseness, self.border) = (n, border);
         Ok(self)
     }
 

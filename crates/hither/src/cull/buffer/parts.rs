@@ -92,12 +92,15 @@ impl Parts {
     }
 
     /// Takes the faces of the patch last asked about apart by their depths: the nearest quarter, the next, and the
-    /// rest. Returns how many parts there are.
+    /// rest. Returns how many parts there are; where all faces turn away, the patch stays whole.
     pub fn find_near(&mut self, depth: impl Fn(usize) -> f32) -> usize {
         self.depths.clear();
         let drawn = |(_, part): &(usize, &u32)| **part != NO_PART;
         self.depths.extend(self.part.iter().enumerate().filter(drawn).map(|(f, _)| depth(f)));
         let count = self.depths.len();
+        if count == 0 {
+            return 1;
+        }
         let mut nearest = |share: usize| *self.depths.select_nth_unstable_by(share, |a, b| b.total_cmp(a)).1;
         let (quarter, half) = (nearest(count / 4), nearest(count / 2));
         for (f, part) in self.part.iter_mut().enumerate().filter(|(_, part)| **part != NO_PART) {
@@ -219,5 +222,12 @@ mod tests {
         assert_eq!(chosen(&parts, 0, 40), (14..20).collect::<Vec<_>>());
         assert_eq!(chosen(&parts, 1, 40), (9..20).collect::<Vec<_>>());
         assert_eq!(chosen(&parts, 2, 40), (0..20).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn what_turns_away_stays_whole() {
+        let (faces, mut parts) = (strips(), Parts::default());
+        assert_eq!(parts.find(&faces, &[0; 40]), 1);
+        assert_eq!(parts.find_near(|f| f as f32), 1);
     }
 }

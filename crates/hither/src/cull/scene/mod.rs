@@ -51,10 +51,11 @@ pub struct CullOptions {
     /// Where an instance must show. Sampled, with nothing that moves.
     pub meaning: Meaning,
     /// Occluders are drawn, and boxes asked about, at so many of the view's pixels across and down a pixel: 1, 2, 4 or
-    /// any other number. The answer is as true, whatever it is; more cost less, and leave out less, above all of what
-    /// is seen through gaps of a few pixels. Thresholds in pixels are rounded up to whole ones of these. 1 if sampled:
-    /// centres are those of the view's pixels.
-    pub coarseness: u32,
+    /// any other number; by default 2 in views of more than [`MANY_PIXELS`], else 1. The answer is as true, whatever it
+    /// is; more cost less, and leave out less, above all of what is seen through gaps of a few pixels. Thresholds in
+    /// pixels are rounded up to whole ones of these, and lengths to one more. 1 if sampled: centres are those of the
+    /// view's pixels.
+    pub coarseness: Option<u32>,
     /// Instances whose boxes cover fewer pixels of the view than this are not drawn as occluders. Smaller hides more,
     /// and costs more.
     pub least_occluder_px: u32,
@@ -80,13 +81,25 @@ pub struct CullOptions {
     pub level: Level,
 }
 
+/// In views of more pixels than this, pixels twice as wide and high take half the time, and leave out hardly less.
+pub const MANY_PIXELS: u64 = 1_000_000;
+
+impl CullOptions {
+    /// How many pixels of a view of that width and height go across and down one of those that it is culled with.
+    pub fn coarseness_in(&self, (width, height): (u32, u32)) -> u32 {
+        let pixels = u64::from(width) * u64::from(height);
+        let by_default = if self.meaning == Meaning::Continuous && pixels > MANY_PIXELS { 2 } else { 1 };
+        self.coarseness.unwrap_or(by_default)
+    }
+}
+
 impl Default for CullOptions {
     fn default() -> Self {
         CullOptions {
             eye_moves: 0.0,
             objects_move: 0.0,
             meaning: Meaning::Continuous,
-            coarseness: 1,
+            coarseness: None,
             least_occluder_px: 800,
             least_piece_px: 6,
             least_px_a_face: 64,
@@ -269,7 +282,10 @@ impl Culler {
             objects_move: options.objects_move,
             level: options.level,
         };
-        let frame = |view| Frame::new(view, &choice)?.meaning(options.meaning)?.coarser(options.coarseness);
+        let frame = |view: &View| {
+            let coarseness = options.coarseness_in((view.width, view.height));
+            Frame::new(view, &choice)?.meaning(options.meaning)?.coarser(coarseness)
+        };
         let frames: Vec<Frame> = views.iter().map(frame).collect::<Result<_, _>>()?;
         self.prepare(index);
         self.views.resize_with(views.len(), OneView::default);

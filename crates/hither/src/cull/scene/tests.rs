@@ -188,7 +188,7 @@ fn what_shows_is_never_left_out_at_any_coarseness() {
         for (k, coarseness) in [1, [2, 3, 4, 7, 100][random.below(5) as usize]].into_iter().enumerate() {
             let least = [0, 40, 400][random.below(3) as usize];
             let options = CullOptions {
-                coarseness,
+                coarseness: Some(coarseness),
                 least_occluder_px: least,
                 least_piece_px: 0,
                 reasons: true,
@@ -210,12 +210,27 @@ fn what_shows_is_never_left_out_at_any_coarseness() {
 #[test]
 fn coarse_pixels_are_refused_where_they_have_no_meaning() {
     let index = SceneIndex::build(trouble::scene(1), &IndexOptions::default());
-    let sampled = CullOptions { meaning: Meaning::Sampled, coarseness: 2, ..CullOptions::default() };
+    let sampled = CullOptions { meaning: Meaning::Sampled, coarseness: Some(2), ..CullOptions::default() };
     assert!(cull(&index, &trouble::view(1), &sampled).is_err());
-    let none = CullOptions { coarseness: 0, ..CullOptions::default() };
+    let none = CullOptions { coarseness: Some(0), ..CullOptions::default() };
     assert!(cull(&index, &trouble::view(1), &none).is_err());
-    let huge = CullOptions { coarseness: u32::MAX, ..CullOptions::default() };
+    let huge = CullOptions { coarseness: Some(u32::MAX), ..CullOptions::default() };
     assert!(cull(&index, &trouble::view(1), &huge).is_ok());
+}
+
+#[test]
+fn many_pixels_are_culled_by_twos() {
+    let usual = CullOptions::default();
+    assert_eq!([(1000, 1000), (1000, 1001), (u32::MAX, u32::MAX)].map(|s| usual.coarseness_in(s)), [1, 2, 2]);
+    let sampled = CullOptions { meaning: Meaning::Sampled, ..usual };
+    assert_eq!(sampled.coarseness_in((1920, 1080)), 1);
+    assert_eq!(CullOptions { coarseness: Some(3), ..usual }.coarseness_in((8, 8)), 3);
+    // The one who says nothing gets what saying it gives.
+    let index = SceneIndex::build(trouble::scene(3), &IndexOptions::default());
+    let view = View { width: 1300, height: 800, ..trouble::view(3) };
+    let [by_default, said] = [None, Some(2)]
+        .map(|coarseness| cull(&index, &view, &CullOptions { coarseness, ..usual }).unwrap().visible);
+    assert_eq!(by_default, said);
 }
 
 #[test]
@@ -224,7 +239,7 @@ fn pixels_larger_than_any_image_leave_out_nothing_that_shows() {
         let index = SceneIndex::build(trouble::scene(seed), &IndexOptions::default());
         let view = trouble::view(seed);
         for (coarseness, eye_moves) in [(1 << 20, 0.0), (1 << 16, 0.01), (1 << 28, 0.01), (u32::MAX, 0.01)] {
-            let options = CullOptions { coarseness, eye_moves, ..CullOptions::default() };
+            let options = CullOptions { coarseness: Some(coarseness), eye_moves, ..CullOptions::default() };
             let visible: HashSet<u32> = cull(&index, &view, &options).unwrap().visible.into_iter().collect();
             assert!(shown(&index, &view).is_subset(&visible), "seed {seed}, {coarseness}");
         }
@@ -369,7 +384,7 @@ fn within_the_margin_a_moved_eye_sees_nothing_that_was_left_out() {
         let r = [0.01, 0.05, 0.2][random.below(3) as usize];
         let options = CullOptions {
             eye_moves: r,
-            coarseness: [1, 1, 2, 3][random.below(4) as usize],
+            coarseness: [None, Some(1), Some(2), Some(3)][random.below(4) as usize],
             least_occluder_px: [0, 0, 60][random.below(3) as usize],
             least_piece_px: 0,
             ..CullOptions::default()

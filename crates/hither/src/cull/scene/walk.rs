@@ -99,11 +99,12 @@ struct Thresholds {
 
 impl Thresholds {
     fn new(options: &CullOptions, frame: &Frame) -> Thresholds {
-        let n = options.coarseness.max(1);
+        let n = frame.coarseness;
         let pixels = f64::from(frame.view.width) * f64::from(frame.view.height) * f64::from(n).powi(2);
         // What a piece hides is a share of the picture, and what it costs is its faces.
         let share = (pixels / FULL_SIZE).min(1.0);
-        let length = |px: u32| px.div_ceil(n).min(1 << 20);
+        // Of a few coarse pixels, those at both ends are covered only in part, and what is thinner may touch as many.
+        let length = |px: u32| (px.div_ceil(n) + u32::from(n > 1)).min(1 << 20);
         let area = |px: u32| px.div_ceil(n.saturating_mul(n));
         Thresholds {
             occluder_px: area(options.least_occluder_px),

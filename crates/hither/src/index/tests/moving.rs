@@ -157,6 +157,26 @@ fn a_tree_grown_loose_is_built_anew() {
     }
 }
 
+#[test]
+fn a_few_that_come_and_go_leave_a_tree_of_many_as_it_is() {
+    let mut scene = Scene::new("swarm");
+    scene.meshes.push(triangle());
+    for i in 0..700 {
+        scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(100.0)));
+    }
+    let mut index = SceneIndex::build(scene, &IndexOptions::default());
+    for node in 0..700 {
+        index.set_shown(node, false);
+    }
+    let places = format!("{:?}", index.groups[0].places);
+    for node in 0..5 {
+        index.set_shown(node * 100, true);
+        assert_eq!(items_in(&index.groups[0].moving), [node * 100]);
+        assert_eq!(format!("{:?}", index.groups[0].places), places);
+        index.set_shown(node * 100, false);
+    }
+}
+
 /// Half the surface of all boxes of a tree.
 fn area(tree: &WideTree) -> f64 {
     let slots = |node: &WideNode| (0..node.used as usize).map(|s| node.bounds_of(s)).collect::<Vec<_>>();
