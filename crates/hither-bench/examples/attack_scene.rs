@@ -33,8 +33,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let index = SceneIndex::build(scene, &IndexOptions::default());
     let places = Places::new(&index);
     let (mut round, mut faults, mut sums) = (first, 0, Sums::default());
+    // One for all rounds, as a program has that goes on: what it keeps of a view must not matter to another.
+    let mut culler = Culler::new();
     while Instant::now() < until {
-        let attack = || places.attack(&index, round, &mut sums);
+        let attack = || places.attack(&index, &mut culler, round, &mut sums);
         match catch_unwind(AssertUnwindSafe(attack)) {
             Ok(Ok(())) => {}
             Ok(Err(fault)) => {
@@ -43,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             Err(_) => {
                 println!("round {round}: panicked");
-                faults += 1;
+                (faults, culler) = (faults + 1, Culler::new());
             }
         }
         round += 1;
@@ -167,7 +169,13 @@ impl Places {
         }
     }
 
-    fn attack(&self, index: &SceneIndex, round: u64, sums: &mut Sums) -> Result<(), String> {
+    fn attack(
+        &self,
+        index: &SceneIndex,
+        culler: &mut Culler,
+        round: u64,
+        sums: &mut Sums,
+    ) -> Result<(), String> {
         let random = &mut Random::new(round);
         let (view, options) = (self.view(index.scene(), random), self.options(random));
         let what = |e: &dyn std::fmt::Display| format!("{e}: {view:?}, {options:?}");
@@ -175,7 +183,6 @@ impl Places {
             sums.refused += 1;
             return Ok(());
         }
-        let mut culler = Culler::new();
         let mut found = HashSet::new();
         for frame in (0..1 + random.below(4)).rev() {
             let step = DVec3::new(0.3, 0.1, 1.0) * (self.reach * 1e-3 * f64::from(frame));
