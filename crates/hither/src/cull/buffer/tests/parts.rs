@@ -20,6 +20,18 @@ fn sheet(profile: &[(f32, f32)], across: u32) -> Occluder {
     Occluder::new(&positions, &triangles, Sides::Front).unwrap()
 }
 
+/// The triangles of so many squares each way, with corners in rows.
+fn grid(cells: u32) -> Vec<[u32; 3]> {
+    let at = |row: u32, i: u32| row * (cells + 1) + i;
+    let squares = (0..cells).flat_map(|row| (0..cells).map(move |i| (row, i)));
+    squares
+        .flat_map(|(row, i)| {
+            let [a, b, c, d] = [at(row, i), at(row, i + 1), at(row + 1, i + 1), at(row + 1, i)];
+            [[a, b, c], [a, c, d]]
+        })
+        .collect()
+}
+
 /// Points from one to another, the first left out.
 fn along(from: (f32, f32), to: (f32, f32), steps: u32) -> impl Iterator<Item = (f32, f32)> {
     let share = move |i: u32| i as f32 / steps as f32;
@@ -64,15 +76,7 @@ fn a_hill_hides_what_is_on_the_ground_far_behind_it() {
         let from_top = ((x / 10.0).powi(2) + ((z - 30.0) / 8.0).powi(2)) * 0.5;
         positions.push(Vec3::new(x, 8.0 * (-from_top).exp() - 1.0, -z));
     }
-    let at = |row: u32, i: u32| row * (cells + 1) + i;
-    let squares = (0..cells).flat_map(|row| (0..cells).map(move |i| (row, i)));
-    let triangles: Vec<[u32; 3]> = squares
-        .flat_map(|(row, i)| {
-            let [a, b, c, d] = [at(row, i), at(row, i + 1), at(row + 1, i + 1), at(row + 1, i)];
-            [[a, b, c], [a, c, d]]
-        })
-        .collect();
-    let occluder = Occluder::new(&positions, &triangles, Sides::Front).unwrap();
+    let occluder = Occluder::new(&positions, &grid(cells), Sides::Front).unwrap();
     assert!(is_hidden(&occluder, (640, 480), [90.0, 0.0]));
     assert!(!is_hidden(&occluder, (640, 480), [25.0, 8.0]));
 }
@@ -93,4 +97,26 @@ fn a_flat_wall_with_a_front_and_a_back_hides_whatever_its_outline_is() {
     };
     assert!(hidden(-1.0, 1.5) && hidden(1.5, 0.0));
     assert!(!hidden(1.5, 2.0));
+}
+
+#[test]
+fn a_rough_valley_that_turns_away_and_reaches_the_eye_hides_nothing() {
+    // Its squares are not flat, so that each is two faces. It is seen from below, and begins before the near plane.
+    let cells = 30;
+    let mut positions = Vec::new();
+    for (row, i) in (0..=cells).flat_map(|row| (0..=cells).map(move |i| (row, i))) {
+        let (x, z) = (i as f32 * 8.0 / 30.0 - 4.0, 5.0 + row as f32 * 0.5);
+        let bent = 1.6 + (12.0 - z).max(0.0) * 0.09;
+        positions.push(Vec3::new(x, bent + 0.002 * ((i * 7 + row * 13) % 5) as f32, -z));
+    }
+    let occluder = Occluder::new(&positions, &grid(cells), Sides::Front).unwrap();
+    assert_eq!(occluder.patch_count(), 1);
+    let projection = Projection::Perspective { fov_y: 0.5, near: 6.0 };
+    let view = View { projection, ..looking_ahead((640, 480)) };
+    for eye_moves in [0.0, 0.01, 0.3] {
+        let options = OcclusionOptions { eye_moves, ..OcclusionOptions::default() };
+        let mut buffer = OcclusionBuffer::new(&view, &options).unwrap();
+        buffer.draw(&occluder, &DAffine3::IDENTITY);
+        assert!(buffer.depths().iter().all(|depth| *depth == 0.0), "{eye_moves}");
+    }
 }
