@@ -81,7 +81,8 @@ pub struct CullOptions {
     pub level: Level,
 }
 
-/// In views of more pixels than this, pixels twice as wide and high take half the time, and leave out hardly less.
+/// In views of more pixels than this, pixels twice as wide and high are the default: in a castle with a market, at
+/// 1920×1080, they took 52 to 92 % of the time and left in up to 4 % more.
 pub const MANY_PIXELS: u64 = 1_000_000;
 
 impl CullOptions {

@@ -136,14 +136,19 @@ fn what_is_switched_off_costs_nothing_but_its_slot() {
     }
 }
 
-#[test]
-fn a_tree_grown_loose_is_built_anew() {
+/// So many triangles, anywhere as far from the origin.
+fn swarm(count: u64, reach: f64) -> Scene {
     let mut scene = Scene::new("swarm");
     scene.meshes.push(triangle());
-    for i in 0..64 {
-        scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(1.0)));
+    for i in 0..count {
+        scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(reach)));
     }
-    let mut index = SceneIndex::build(scene, &IndexOptions::default());
+    scene
+}
+
+#[test]
+fn a_tree_grown_loose_is_built_anew() {
+    let mut index = SceneIndex::build(swarm(64, 1.0), &IndexOptions::default());
     let mut random = Random(9);
     for round in 0..8 {
         for node in 0..64 {
@@ -159,12 +164,7 @@ fn a_tree_grown_loose_is_built_anew() {
 
 #[test]
 fn a_few_that_come_and_go_leave_a_tree_of_many_as_it_is() {
-    let mut scene = Scene::new("swarm");
-    scene.meshes.push(triangle());
-    for i in 0..700 {
-        scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(100.0)));
-    }
-    let mut index = SceneIndex::build(scene, &IndexOptions::default());
+    let mut index = SceneIndex::build(swarm(700, 100.0), &IndexOptions::default());
     for node in 0..700 {
         index.set_shown(node, false);
     }
@@ -185,11 +185,7 @@ fn area(tree: &WideTree) -> f64 {
 
 #[test]
 fn a_tree_forgets_what_was_far_away_or_nowhere_for_a_while() {
-    let mut scene = Scene::new("swarm");
-    scene.meshes.push(triangle());
-    for i in 0..100 {
-        scene.groups[0].push(shown(Content::Mesh(0), Random(i).point(1.0)));
-    }
+    let scene = swarm(100, 1.0);
     for away in [3e3, 1e15, 1e30, f64::NAN, f64::INFINITY] {
         let mut index = SceneIndex::build(scene.clone(), &IndexOptions::default());
         let mut random = Random(5);
