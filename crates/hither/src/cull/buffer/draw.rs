@@ -2,7 +2,7 @@
 
 use super::ask::{BoxView, BoxesOnScreen, project_lanes};
 use super::clip::{self, Clipped, EdgeOf, clip, doubled_area};
-use super::convex::{self, Bounds};
+use super::convex;
 use super::fill::{Corner, Goes, Joint, Outline, fill, first_pixel, last_pixel};
 use super::fine::FinePatch;
 use super::loose::{LooseFaces, Sixteen, fill_one, set_up};
@@ -11,6 +11,8 @@ use super::occluder::{ENDS, Face, Occluder, Part, Patch};
 use super::parts::{Apart, Parts};
 use super::pass::Pass;
 use super::place::{Placed, Placing, Sizes};
+use super::round::{self, Round};
+use super::silhouette::Silhouette;
 use super::surface::Surface;
 use super::worth::{PX_A_CLIPPED_FACE, PX_A_FINE_FACE, area_of, bodies, is_fine};
 use super::{Drawn, Margin};
@@ -34,7 +36,8 @@ pub(in crate::cull) struct Band {
     loose: Box<Sixteen>,
     mosaic: Mosaic,
     parts: Parts,
-    bounds: Bounds,
+    silhouette: Silhouette,
+    round: round::Room,
     /// The children of a node.
     boxes: Box<BoxesOnScreen>,
     open: NearestFirst<Open>,
@@ -86,7 +89,8 @@ impl Band {
             loose: Box::default(),
             mosaic: Mosaic::default(),
             parts: Parts::default(),
-            bounds: Bounds::default(),
+            silhouette: Silhouette::default(),
+            round: round::Room::default(),
             boxes: Box::new(BoxesOnScreen::NONE),
             open: NearestFirst::new(),
         }
@@ -304,6 +308,13 @@ impl Band {
         if !bodies.is_empty() {
             return;
         }
+        if let (false, Some(body)) = (plain, &patch.round)
+            && let Some(faces) = self.draw_round(simd, standing, pass, body)
+        {
+            drawn.patches += 1;
+            drawn.faces += faces;
+            return;
+        }
         let faces = &standing.occluder.faces[patch.first_face as usize..][..patch.faces as usize];
         if let (false, Some(fine)) = (plain, &patch.fine)
             && is_fine(rect, patch.faces as usize, PX_A_FINE_FACE)
@@ -347,6 +358,33 @@ impl Band {
             }
             self.draw_turned(simd, faces, placing.slack, around, margin_px);
         }
+    }
+
+    /// Draws a patch that is a round body. Returns how many of its faces are seen; nothing, if it must be drawn in another
+    /// way.
+    #[inline(always)]
+    fn draw_round<S: Simd>(
+        &mut self,
+        simd: S,
+        standing: &Standing,
+        pass: &Pass,
+        body: &Round,
+    ) -> Option<u64> {
+        let Open { depth, farthest, rect, .. } = pass.open;
+        let drawing = round::Drawing {
+            body: standing.occluder.round.get(body),
+            standing,
+            placing: &pass.placing,
+            rect,
+            nearest: depth,
+            farthest,
+        };
+        round::draw(
+            simd,
+            &mut self.surface,
+            (&mut self.silhouette, &mut self.placed, &mut self.round),
+            &drawing,
+        )
     }
 
     /// Draws a patch whose corners are placed and whose turns the mosaic has. False if it must be drawn in another way.
@@ -444,7 +482,7 @@ impl Band {
                 front_sign: standing.at.front_sign as i32,
                 slack: placing.slack,
             };
-            let faces = convex::draw(simd, &mut self.surface, &mut self.bounds, &drawing);
+            let faces = convex::draw(simd, &mut self.surface, &mut self.silhouette, &drawing);
             drawn.patches += u64::from(faces > 0);
             drawn.faces += faces;
         }

@@ -47,11 +47,12 @@
 //! *Cutting* at the near plane and at the guard band replaces the chain by another with the same cut points for
 //! both owners of an edge; what the near plane cuts ends there.
 //!
-//! # Four ways to draw a patch
+//! # Five ways to draw a patch
 //!
 //! All rest on the same inequality; they differ in what they need not look at. A patch of one face ends at every
-//! edge, so a pixel is covered where it lies inside all of them (`loose`); of a closed convex patch of few faces,
-//! wholly beyond the near plane, where it lies inside all edges of the silhouette (`convex`). In a patch of faces
+//! edge, so a pixel is covered where it lies inside all of them (`loose`); of a closed convex patch, wholly beyond the
+//! near plane, where it lies inside all edges of the silhouette (`silhouette`): its depth is that of the planes of its
+//! faces, pixel by pixel if they are few (`convex`), over blocks if they are many (`round`). In a patch of faces
 //! that are not large N(c) is counted from the outline alone, and each face lowers depth in the whole rectangle
 //! around it, to its plane or to its farthest corner (`mosaic`). Else each face is filled, and only pixels that
 //! shared edges cross are counted (`fill`). In both, whole blocks that are covered raise one number, and only what is
@@ -109,8 +110,10 @@ mod parts;
 mod pass;
 mod place;
 mod queries;
+mod round;
 mod sampled;
 mod shared;
+mod silhouette;
 mod surface;
 mod tile;
 mod worth;

@@ -17,6 +17,7 @@ use super::fine::{Fine, FineFaces};
 use super::inner::inner_boxes;
 use super::loose::LooseFaces;
 use super::parts::folds;
+use super::round::{Round, RoundBodies};
 use crate::index::{Box3, WideTree, blocks_of_boxes, tree_of_boxes};
 use crate::scene::{AlphaMode, Material, Mesh};
 use glam::{DVec3, Vec3};
@@ -62,6 +63,7 @@ pub struct Occluder {
     pub(super) loose: Vec<LooseFaces>,
     pub(super) fine: FineFaces,
     pub(super) convex: Vec<ConvexBody>,
+    pub(super) round: RoundBodies,
     /// Boxes inside closed patches, each a patch without faces of its own.
     pub(super) inner: Vec<Patch>,
     triangles: usize,
@@ -92,8 +94,10 @@ pub(super) struct Patch {
     pub faces: u32,
     /// Where it lies among the fine patches, if it has many faces.
     pub fine: Option<Fine>,
-    /// Its place among the convex bodies, if it is one of few faces.
+    /// Its place among the convex bodies, if it is one of few faces, …
     pub convex: Option<u32>,
+    /// … and where it lies among the round ones, if it is one of many.
+    pub round: Option<Round>,
     /// The boxes inside of it.
     pub inner: Range<u32>,
     /// Whether some of it may lie before other parts of it.
@@ -186,6 +190,7 @@ impl Occluder {
             + size_of_val(self.loose.as_slice())
             + self.fine.memory_bytes()
             + size_of_val(self.convex.as_slice())
+            + self.round.memory_bytes()
             + size_of_val(self.inner.as_slice())
     }
 }
@@ -377,6 +382,7 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
         }
         let convex = add_convex(&mut occluder, first_face, first_vertex);
         let (these, vertices) = (&occluder.faces[first_face as usize..], &occluder.vertices);
+        let round = occluder.round.push(these, vertices, first_vertex);
         occluder.patches.push(Patch {
             first_vertex,
             vertices: vertices.x.len() as u32 - first_vertex,
@@ -385,7 +391,8 @@ fn lay_out(points: &[Vec3], pieces: &[Piece]) -> Occluder {
             fine: occluder.fine.push(these, vertices, first_vertex),
             convex,
             inner: 0..0,
-            folds: convex.is_none() && folds(these, vertices, first_vertex),
+            folds: convex.is_none() && round.is_none() && folds(these, vertices, first_vertex),
+            round,
         });
         boxes.push(bounds);
     }
@@ -437,10 +444,10 @@ fn add_inner_boxes(occluder: &mut Occluder) {
                 occluder.convex.push(body);
                 let convex = Some(occluder.convex.len() as u32 - 1);
                 let (first_face, faces, fine) = (0, 0, None);
-                let (inner, folds) = (0..0, false);
+                let (inner, folds, round) = (0..0, false, None);
                 let vertices = 8;
                 let box_patch =
-                    Patch { first_vertex, vertices, first_face, faces, fine, convex, inner, folds };
+                    Patch { first_vertex, vertices, first_face, faces, fine, convex, round, inner, folds };
                 occluder.inner.push(box_patch);
             }
         }

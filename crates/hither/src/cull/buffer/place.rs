@@ -108,21 +108,15 @@ impl Placing {
     pub fn place<S: Simd>(&self, simd: S, vertices: &Vertices, patch: &Patch, placed: &mut Placed) {
         let (first, count) = (patch.first_vertex as usize, patch.vertices as usize);
         placed.corner.resize(count, [0; 4]);
-        let round = f64x8::splat(simd, ROUND);
         let mut nearest = f32x16::splat(simd, 0.0);
         let mut done = 0;
         while done < count {
             // Sixteen at a time, or the last eight twice.
             let wide = done + 16 <= count;
             let (lo, hi) = (first + done, if wide { first + done + 8 } else { first + done });
-            let x = load(simd, &vertices.x, lo, hi);
-            let y = load(simd, &vertices.y, lo, hi);
-            let z = load(simd, &vertices.z, lo, hi);
-            let low = self.project(simd, [x.0, y.0, z.0]);
-            let high = self.project(simd, [x.1, y.1, z.1]);
-            let sx: i32x16<S> = simd.narrow_i64x8((low[0] + round).bitcast(), (high[0] + round).bitcast());
-            let sy: i32x16<S> = simd.narrow_i64x8((low[1] + round).bitcast(), (high[1] + round).bitcast());
-            let depth = simd.narrow_f64x8(low[2], high[2]);
+            let (x, y) = (load(simd, &vertices.x, lo, hi), load(simd, &vertices.y, lo, hi));
+            let [sx, sy, depth] = self.snapped(simd, [x, y, load(simd, &vertices.z, lo, hi)]);
+            let depth = depth.bitcast::<f32x16<S>>();
             nearest = nearest.max(depth);
             if wide {
                 store_corners(simd, [sx, sy, depth.bitcast()], &mut placed.corner[done..][..16]);
@@ -135,6 +129,39 @@ impl Placing {
             }
         }
         placed.nearest = nearest.reduce_max();
+    }
+
+    /// Some points of such a patch. What is largest among the depths is not found out.
+    #[inline(always)]
+    pub fn place_points<S: Simd>(
+        &self,
+        simd: S,
+        mut points: impl ExactSizeIterator<Item = [f32; 3]>,
+        placed: &mut Placed,
+    ) {
+        placed.corner.resize(points.len().next_multiple_of(16), [0; 4]);
+        let mut p = [[0.0; 16]; 3];
+        for corners in placed.corner.chunks_exact_mut(16) {
+            for (lane, point) in points.by_ref().take(16).enumerate() {
+                (p[0][lane], p[1][lane], p[2][lane]) = (point[0], point[1], point[2]);
+            }
+            let x = simd.widen_f32x16(f32x16::from_slice(simd, &p[0]));
+            let y = simd.widen_f32x16(f32x16::from_slice(simd, &p[1]));
+            let z = simd.widen_f32x16(f32x16::from_slice(simd, &p[2]));
+            let [x, y, depth] = self.snapped(simd, [x, y, z]);
+            store_corners(simd, [x, y, depth], corners);
+        }
+    }
+
+    /// Sixteen points on the screen: x and y, 1/256 pixel, and the bits of depths.
+    #[inline(always)]
+    fn snapped<S: Simd>(&self, simd: S, [x, y, z]: [(f64x8<S>, f64x8<S>); 3]) -> [i32x16<S>; 3] {
+        let round = f64x8::splat(simd, ROUND);
+        let low = self.project(simd, [x.0, y.0, z.0]);
+        let high = self.project(simd, [x.1, y.1, z.1]);
+        let x = simd.narrow_i64x8((low[0] + round).bitcast(), (high[0] + round).bitcast());
+        let y = simd.narrow_i64x8((low[1] + round).bitcast(), (high[1] + round).bitcast());
+        [x, y, simd.narrow_f64x8(low[2], high[2]).bitcast()]
     }
 
     /// Screen x and y in 1/256 pixel, and depth.

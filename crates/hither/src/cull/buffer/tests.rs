@@ -14,8 +14,11 @@ mod far;
 mod loose;
 mod moving;
 mod parts;
+mod round;
 mod sampled;
 mod shared;
+
+use round::round_bodies;
 
 /// A buffer with everything of `scene` drawn into it.
 fn drawn(scene: &Scene, view: &View, options: &OcclusionOptions) -> OcclusionBuffer {
@@ -270,24 +273,40 @@ fn no_pixel_holds_more_than_is_there_where_only_boxes_inside_are_drawn() {
     assert!(covered > 20_000 && shot > 80_000, "{covered} pixels, {shot} rays");
 }
 
-#[test]
-fn counting_outlines_and_counting_faces_cover_the_same_pixels() {
-    let (mut both, mut one, mut nearer) = (0u32, 0u32, 0u32);
-    for seed in 0..1500 {
-        let (scene, view) = rubble(seed);
+/// How what is drawn differs from what is drawn face by face: pixels that both cover, that only one does, and of those
+/// that both do where it is nearer than anything that plain faces hold around, and where it is farther by a hundredth.
+#[derive(Debug, Default)]
+struct Compared {
+    both: u32,
+    one: u32,
+    nearer: u32,
+    farther: u32,
+}
+
+fn compared(seeds: u64, scene_of: impl Fn(u64) -> (Scene, View)) -> Compared {
+    let mut sum = Compared::default();
+    for seed in 0..seeds {
+        let (scene, view) = scene_of(seed);
         let fast = drawn(&scene, &view, &OcclusionOptions::default()).depths();
         let plain = drawn_plainly(&scene, &view).depths();
         let around = nearest_around(&plain, view.width as usize);
         for ((fast, plain), around) in fast.iter().zip(&plain).zip(around) {
-            // Where a face is seen edge-on, only one of them may have drawn it.
-            both += u32::from(*fast > 0.0 && *plain > 0.0);
-            one += u32::from((*fast > 0.0) != (*plain > 0.0));
-            nearer += u32::from(*plain > 0.0 && *fast > around * 1.000_1);
+            sum.both += u32::from(*fast > 0.0 && *plain > 0.0);
+            sum.one += u32::from((*fast > 0.0) != (*plain > 0.0));
+            sum.nearer += u32::from(*plain > 0.0 && *fast > around * 1.000_1);
+            sum.farther += u32::from(*fast > 0.0 && *fast < plain * 0.99);
         }
     }
-    // At the rim of a patch no block of it is there that lies nearer.
-    let differ = (one * 100).max(nearer * 25);
-    assert!(both > 200_000 && differ < both, "{both} pixels, {one} covered in one alone, {nearer} nearer");
+    sum
+}
+
+#[test]
+fn counting_outlines_and_counting_faces_cover_the_same_pixels() {
+    // Where a face is seen edge-on, only one of them may have drawn it. At the rim of a patch no block of it is there that
+    // lies nearer.
+    let sum = compared(1500, rubble);
+    let differ = (sum.one * 100).max(sum.nearer * 25);
+    assert!(sum.both > 200_000 && differ < sum.both, "{sum:?}");
 }
 
 /// Closed convex bodies of few faces, of all shapes and sizes, mirrored or not, some seen from both sides.
@@ -342,26 +361,11 @@ fn no_pixel_holds_more_than_is_there_on_convex_bodies() {
 
 #[test]
 fn convex_bodies_cover_what_their_faces_cover() {
-    let (mut both, mut one, mut nearer, mut farther) = (0u32, 0u32, 0u32, 0u32);
-    for seed in 0..1500 {
-        let (scene, view) = bodies(seed);
-        let fast = drawn(&scene, &view, &OcclusionOptions::default()).depths();
-        let plain = drawn_plainly(&scene, &view).depths();
-        let around = nearest_around(&plain, view.width as usize);
-        for ((fast, plain), around) in fast.iter().zip(&plain).zip(around) {
-            both += u32::from(*fast > 0.0 && *plain > 0.0);
-            one += u32::from((*fast > 0.0) != (*plain > 0.0));
-            nearer += u32::from(*plain > 0.0 && *fast > around * 1.000_1);
-            farther += u32::from(*fast > 0.0 && *fast < plain * 0.99);
-        }
-    }
     // A plane, lowered by what it falls within half a pixel, is below its neighbour's for about a pixel beyond their
-    // edge. At the rim of a body no block of it is there that lies nearer.
-    let differ = (one * 100).max(nearer * 25).max(farther * 50);
-    assert!(
-        both > 200_000 && differ < both,
-        "{both} pixels, {one} covered in one alone, {nearer} nearer, {farther} farther"
-    );
+    // edge. At the rim of a body, and at its edges towards the eye, no block of it is there that lies nearer.
+    let sum = compared(1500, bodies);
+    let differ = (sum.one * 100).max(sum.nearer * 15).max(sum.farther * 50);
+    assert!(sum.both > 200_000 && differ < sum.both, "{sum:?}");
 }
 
 #[test]
@@ -395,8 +399,11 @@ fn edges_inside_a_surface_do_not_leak() {
 
 #[test]
 fn order_instruction_set_bands_and_threads_change_nothing() {
-    for seed in 0..40 {
-        let (scene, view) = (trouble::scene(seed + 1000), trouble::view(seed + 1000));
+    for seed in 0..80 {
+        let (scene, view) = match seed % 2 {
+            0 => (trouble::scene(seed + 1000), trouble::view(seed + 1000)),
+            _ => round_bodies(seed),
+        };
         let reference = drawn(&scene, &view, &OcclusionOptions::default()).depths();
         for level in levels() {
             let plain = OcclusionOptions { level, ..OcclusionOptions::default() };

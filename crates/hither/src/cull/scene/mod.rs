@@ -62,8 +62,8 @@ pub struct CullOptions {
     /// Connected pieces of an occluder that touch fewer pixels of the view across or down are left out.
     pub least_piece_px: u32,
     /// So are pieces whose bounding boxes cover fewer pixels of the view than this for each of their faces: they cost
-    /// more than they hide. In a view of fewer pixels than 1920×1080, so much less. Of closed convex pieces of few faces a sixteenth is enough. If another is closed, and
-    /// large enough, a few boxes inside of it are drawn instead.
+    /// more than they hide. In a view of fewer pixels than 1920×1080, so much less. Of closed convex pieces of few faces a
+    /// sixteenth is enough. If another is closed, and large enough, a few boxes inside of it are drawn instead.
     pub least_px_a_face: u32,
     /// Boxes of a mesh's own tree that are asked about before an instance counts as visible.
     pub boxes_an_instance: u32,

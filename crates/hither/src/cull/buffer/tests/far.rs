@@ -162,10 +162,11 @@ fn moved_away(scene: &mut Scene, view: &mut View, offset: DVec3, in_meshes: bool
 fn no_pixel_holds_more_than_is_there_far_from_the_origin() {
     let random = &mut Random::new(5);
     let (mut covered, mut shot) = (0, 0);
-    for seed in 0..900u64 {
-        let (mut scene, mut view) = match seed % 3 {
+    for seed in 0..1200u64 {
+        let (mut scene, mut view) = match seed % 4 {
             0 => rubble(seed),
             1 => bodies(seed),
+            2 => round_bodies(seed),
             _ => (trouble::scene(seed), trouble::view(seed)),
         };
         let away = [1e2, 1e3, 1e4, 1e5, 1e6, 5.5e6][random.below(6) as usize];

@@ -130,12 +130,13 @@ fn asked(buffer: &OcclusionBuffer, b: &Aabb) -> bool {
 
 #[test]
 fn whatever_was_drawn_a_moved_eye_sees_nothing_that_it_hides() {
-    let counts = (0..1500u64).into_par_iter().map(|seed| {
+    let counts = (0..2250u64).into_par_iter().map(|seed| {
         let random = &mut Random::new(seed + 90);
-        let (scene, view) = match seed % 5 {
+        let (scene, view) = match seed % 6 {
             0 => rubble(seed),
             1 => bodies(seed),
             2 => (lumps(seed), around(random, 4.0, (80, 60))),
+            3 => round_bodies(seed),
             _ => floors(seed),
         };
         let r = [1e-6, 0.003, 0.02, 0.1, 0.4][random.below(5) as usize];
@@ -175,7 +176,7 @@ fn whatever_was_drawn_a_moved_eye_sees_nothing_that_it_hides() {
                 points_are_out_of_sight(&sight, &moved, b, Verdict::Hidden, random, seed);
             }
         }
-        [usize::from(seed % 5 < 3) * hidden.len(), usize::from(seed % 5 >= 3) * hidden.len()]
+        [usize::from(seed % 6 < 4) * hidden.len(), usize::from(seed % 6 >= 4) * hidden.len()]
     });
     let [small, large] = counts.reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
     assert!(small > 2000 && large > 8000, "{small} behind what is small, {large} behind what is large");
