@@ -95,7 +95,7 @@ pub struct LayerPicture<'a> {
 }
 
 /// Writes a picture and its layers, front to back, as the parts of one EXR file, whole or not at all; `notes` become text
-/// attributes of the file. Parts are named `NNN name`, for EXR wants names to differ.
+/// attributes of the file. Parts are named `NNN name`, for EXR wants names to differ; names of more than 200 bytes are cut.
 ///
 /// The picture is the first of `layers`: its channels are `R`, `G`, `B`, `A`, for programs that know no layers. Those of
 /// a layer are `NNN name.Combined.R` and so on, and every part has a value for every pixel: Blender tells layers by
@@ -121,7 +121,7 @@ fn encode_layers(
 ) -> io::Result<Vec<u8>> {
     let size = (width as usize, height as usize);
     let parts = layers.iter().copied().enumerate().map(|(number, layer)| {
-        let name = format!("{number:03} {}", layer.name);
+        let name = format!("{number:03} {}", shortened(layer.name));
         let channel = |channel: &str| match number {
             0 => Text::from(channel),
             _ => text(&format!("{name}.Combined.{channel}")),
@@ -156,11 +156,20 @@ fn encode_layers(
     Ok(encoded.into_inner())
 }
 
-/// Text without what EXR's one-byte characters cannot hold.
+/// Longer names are cut: with what is added to them, names of channels are to have no more than 255 bytes.
+const LONGEST_NAME: usize = 200;
+
+/// A layer's name, or as much of it as there is room for.
+fn shortened(name: &str) -> String {
+    match name.len() {
+        ..=LONGEST_NAME => name.to_owned(),
+        _ => format!("{}…", &name[..name.floor_char_boundary(LONGEST_NAME)]),
+    }
+}
+
+/// UTF-8, as OpenEXR has it; where bytes end in 0, a 0 cannot be among them.
 fn text(value: &str) -> Text {
-    Text::new_or_none(value).unwrap_or_else(|| {
-        Text::from(value.chars().map(|c| if c.is_ascii() { c } else { '?' }).collect::<String>().as_str())
-    })
+    Text::from_slice_unchecked(value.replace('\0', " ").as_bytes())
 }
 
 fn channel(name: &str, samples: FlatSamples) -> AnyChannel<FlatSamples> {
@@ -243,5 +252,22 @@ mod tests {
         assert_eq!((red[8], red[9], red[16], red.iter().sum::<f32>()), (0.0, 1.0, 5.0, 15.0));
         assert_eq!(values(1, "001 wall.001.Combined.A").iter().sum::<f32>(), 6.0);
         assert_eq!(values(2, "002 b.Combined.A"), [0.0; 30]);
+    }
+
+    #[test]
+    fn long_names_are_cut_and_all_are_utf_8() {
+        let (name, pixels) = ("été 日本 ".repeat(30), [[1.0; 4]]);
+        let layer =
+            LayerPicture { name: &name, position: (0, 0), size: (1, 1), pixels: &pixels, visible: true };
+        let encoded = encode_layers((1, 1), &[layer, layer], &[("expression", "über")]).unwrap();
+        assert!(encoded.windows(5).any(|bytes| bytes == "über".as_bytes()));
+        let back =
+            read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
+        let back = back.from_buffered(Cursor::new(encoded)).unwrap();
+        for channel in &back.layer_data[1].channel_data.list {
+            let bytes = channel.name.as_slice();
+            let text = std::str::from_utf8(bytes).unwrap();
+            assert!(bytes.len() <= 255 && text.starts_with("001 été 日本 "), "{} bytes, {text}", bytes.len());
+        }
     }
 }

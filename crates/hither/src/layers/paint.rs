@@ -8,11 +8,13 @@
 use super::coverage::Drawn;
 use super::sight::Holdout;
 use super::sprite::Sprite;
-use crate::conventions::{View, ViewError};
+use crate::conventions::{Projection, View, ViewError};
+use crate::geometry::Aabb;
 use crate::index::{IndexOptions, SceneIndex};
-use crate::render::{RenderOptions, Renderer, Shader, Shading};
-use crate::scene::{Content, Group, Node, Scene, Transform};
+use crate::render::{RenderOptions, Renderer, Shader, Shading, Window};
+use crate::scene::{Content, Group, Mesh, Node, Scene, Transform};
 use glam::{DAffine3, DMat3};
+use std::ops::Range;
 
 /// How layers are drawn.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +58,9 @@ pub struct LayerPainter {
     pub(super) renderer: Renderer,
     shader: Shader,
     pub(super) poses: Vec<DAffine3>,
+    /// Of each instance its mesh, and of each mesh the box around it.
+    meshes: Vec<u32>,
+    bounds: Vec<Aabb>,
     shown: Vec<u32>,
 }
 
@@ -85,7 +90,9 @@ impl LayerPainter {
         // Everything moves from the start: otherwise its tree would be made anew with each thing that joins.
         let nowhere = DAffine3 { matrix3: DMat3::ZERO, ..DAffine3::from_translation(glam::DVec3::ONE) };
         index.set_transforms((0..poses.len() as u32).map(|i| (i, Transform::Affine(nowhere))));
-        LayerPainter { index, renderer: Renderer::new(), shader, poses, shown: Vec::new() }
+        let meshes = instances.iter().map(|i| i.mesh).collect();
+        let bounds = scene.meshes.iter().map(Mesh::bounds).collect();
+        LayerPainter { index, renderer: Renderer::new(), shader, poses, meshes, bounds, shown: Vec::new() }
     }
 
     /// Follows the scene to another pose; it must be the same scene otherwise.
@@ -116,16 +123,24 @@ impl LayerPainter {
         let samples = options.samples.max(1);
         let fine = options.fine(view);
         let frame = self.renderer.render(&self.index, &fine, &options.render)?;
-        let mut image = self.shader.shade(self.index.scene(), &frame, options.shading);
+        let window = self.window(instances, view);
+        let in_samples = |range: &Range<u32>| range.start * samples..range.end * samples;
+        let all = Window { columns: in_samples(&window.columns), rows: in_samples(&window.rows) };
+        let image = self.shader.shade_within(self.index.scene(), &frame, options.shading, &all);
+        let columns = all.columns.start as usize..all.columns.end as usize;
+        let rows = image.pixels.chunks_exact(fine.width as usize);
+        let mut shaded: Vec<[f32; 4]> = rows.flat_map(|row| &row[columns.clone()]).copied().collect();
         if let Some(holdout) = holdout.filter(|h| h.samples() > 0) {
-            for (pixel, at) in image.pixels.iter_mut().zip(0u32..) {
-                if holdout.holds(at % fine.width, at / fine.width) {
+            let places = all.rows.clone().flat_map(|y| all.columns.clone().map(move |x| (x, y)));
+            for (pixel, (x, y)) in shaded.iter_mut().zip(places) {
+                if holdout.holds(x, y) {
                     *pixel = [0.0; 4];
                 }
             }
         }
-        let pixels = reduced(&image.pixels, fine.width, samples);
-        let sprite = Sprite::cut(view.width, &pixels);
+        let samples_sprite = if samples > 1 { Sprite::of_window(&all, &shaded) } else { Sprite::default() };
+        let pixels = if samples > 1 { reduced(&shaded, all.columns.len(), samples) } else { shaded };
+        let sprite = Sprite::of_window(&window, &pixels);
         let mean = |x: u32, y: u32| {
             let all = (0..samples * samples).map(|i| (x * samples + i % samples, y * samples + i / samples));
             let (mut sum, mut count) = (0.0, 0);
@@ -139,9 +154,42 @@ impl LayerPainter {
             .flat_map(|y| (sprite.x..sprite.x + sprite.width).map(move |x| (x, y)))
             .map(|(x, y)| mean(x, y));
         let alone = Painted { distances: distances.collect(), sprite };
-        let samples = if samples > 1 { Sprite::cut(fine.width, &image.pixels) } else { Sprite::default() };
         self.renderer.recycle(frame);
-        Ok(Drawn { alone, counts: true, samples })
+        Ok(Drawn { alone, counts: true, samples: samples_sprite })
+    }
+
+    /// The part of the picture outside of which instances show nothing.
+    fn window(&self, instances: &[u32], view: &View) -> Window {
+        // Columns and rows, in pixels from the middle.
+        let mut around = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for &instance in instances {
+            let (mesh, pose) = (self.meshes[instance as usize], &self.poses[instance as usize]);
+            let in_view = view.view_from_world * *pose;
+            let Aabb { min, max } = self.bounds[mesh as usize].transformed(&in_view);
+            // More than what is lost far from the origin, where large numbers cancel.
+            let lost = pose.translation.abs().max_element() + in_view.translation.abs().max_element();
+            let (min, max) = (min - lost * 1e-12, max + lost * 1e-12);
+            let distances = match view.projection {
+                Projection::Perspective { near, .. } if -max.z > near => [-max.z, -min.z],
+                // What may reach the near plane may be anywhere.
+                Projection::Perspective { .. } => return Window::of(view),
+                Projection::Orthographic { .. } => [1.0; 2],
+            };
+            let sides = [[min.x, max.x], [-max.y, -min.y]];
+            for ([low, high], sides) in around.iter_mut().zip(sides) {
+                for side in distances.iter().flat_map(|d| sides.map(|side| side / d)) {
+                    (*low, *high) = (low.min(side), high.max(side));
+                }
+            }
+        }
+        let pixels = |[low, high]: [f64; 2], size: u32| {
+            // A pixel more than corners are snapped by, and than numbers are off.
+            let at = |side: f64, more: f64| side * view.pixels_per_unit() + f64::from(size) * 0.5 + more;
+            let [first, end] =
+                [at(low, -2.0).floor(), at(high, 2.0).ceil()].map(|v| v.clamp(0.0, f64::from(size)) as u32);
+            first..end.max(first)
+        };
+        Window { columns: pixels(around[0], view.width), rows: pixels(around[1], view.height) }
     }
 
     /// Puts `instances` in their places and all others out of sight.
@@ -166,12 +214,12 @@ fn hidden(world_from_view: &DAffine3) -> DAffine3 {
     DAffine3 { matrix3: DMat3::ZERO, translation: behind }
 }
 
-/// The mean of each square of `samples` × `samples` pixels; the picture itself where that is one.
-fn reduced(pixels: &[[f32; 4]], width: u32, samples: u32) -> Vec<[f32; 4]> {
-    if samples == 1 {
-        return pixels.to_vec();
+/// The mean of each square of `samples` × `samples` pixels of a picture so many wide.
+fn reduced(pixels: &[[f32; 4]], w: usize, samples: u32) -> Vec<[f32; 4]> {
+    let n = samples as usize;
+    if w == 0 {
+        return Vec::new();
     }
-    let (n, w) = (samples as usize, width as usize);
     let share = 1.0 / (n * n) as f64;
     let rows = pixels.chunks_exact(w * n);
     rows.flat_map(|rows| {

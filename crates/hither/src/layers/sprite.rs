@@ -1,5 +1,7 @@
 //! Pictures that know where they are: a layer's is cut to what it covers.
 
+use crate::render::Window;
+
 /// A piece of a picture: rows from the top, linear premultiplied RGBA; transparent outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sprite {
@@ -37,6 +39,18 @@ impl Sprite {
             height: (bottom + 1 - top) as u32,
             pixels: cut,
         }
+    }
+
+    /// Cuts a window of a whole picture.
+    pub(super) fn of_window(window: &Window, pixels: &[[f32; 4]]) -> Sprite {
+        if pixels.is_empty() {
+            return Sprite::default();
+        }
+        let mut sprite = Sprite::cut(window.columns.len() as u32, pixels);
+        if !sprite.is_empty() {
+            (sprite.x, sprite.y) = (sprite.x + window.columns.start, sprite.y + window.rows.start);
+        }
+        sprite
     }
 
     /// Whether it shows nothing.

@@ -83,11 +83,12 @@ struct Shaded {
     color: Vec4,
 }
 
-/// Composites the blended surfaces of a scene over `image`, the shaded picture of `frame`.
+/// Composites the blended surfaces of a scene over `image`, the shaded picture of `frame`'s rows from `top` on.
 ///
 /// `fragments(rows)` is as [`Shader::shade_with`](super::Shader::shade_with) demands.
 pub(super) fn composite(
     image: &mut Image,
+    top: u32,
     setting: &Setting,
     frame: &Frame,
     locator: &InstanceLocator,
@@ -96,7 +97,7 @@ pub(super) fn composite(
     let width = frame.view.width as usize;
     let rows = rows_of_a_band(&frame.view) as usize;
     image.pixels.par_chunks_mut(rows * width).enumerate().for_each(|(band, pixels)| {
-        let first = band * rows;
+        let first = top as usize + band * rows;
         let found = fragments(first as u32..(first + pixels.len() / width) as u32);
         let mut shaded = shade_what_shows(found, setting, frame, locator);
         shaded.sort_unstable_by(|a, b| {

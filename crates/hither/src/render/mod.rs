@@ -11,6 +11,7 @@ mod windows;
 pub use blend::{BlendedTriangles, Fragment};
 pub use coherence::Coherence;
 pub use frame::{Complexity, Counters, Frame};
+pub(crate) use shade::Window;
 pub use shade::{
     COMPLEXITY_WHITE, ComplexityPanel, Image, Shader, Shading, complexity_image, complexity_panels, shade,
 };

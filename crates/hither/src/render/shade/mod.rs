@@ -18,7 +18,7 @@ pub(super) use triangle::{Rays, TriangleInView, depth_at};
 
 use super::Frame;
 use super::blend::{BlendedTriangles, Fragment, composite, instances_that_show};
-use crate::conventions::{NO_ID, SurfaceId};
+use crate::conventions::{NO_ID, SurfaceId, View};
 use crate::index::SceneIndex;
 use crate::scene::{InstanceLocator, Scene, TexturePyramids};
 use false_color::{DepthRange, id_color, normal_color};
@@ -96,11 +96,20 @@ impl Shader {
 
     /// Shades `frame`, which must be of `scene` in its present pose.
     pub fn shade(&mut self, scene: &Scene, frame: &Frame, shading: Shading) -> Image {
-        if !shading.shows_blended() {
-            return self.shade_with(scene, frame, shading, |_| Vec::new());
-        }
-        let blended = BlendedTriangles::find(scene, &frame.view);
-        self.shade_with(scene, frame, shading, |rows| blended.fragments(rows))
+        self.shade_within(scene, frame, shading, &Window::of(&frame.view))
+    }
+
+    /// As [`Shader::shade`], of a part of the picture: its rows, transparent beyond its columns.
+    pub(crate) fn shade_within(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        shading: Shading,
+        window: &Window,
+    ) -> Image {
+        let blended = shading.shows_blended().then(|| BlendedTriangles::find(scene, &frame.view));
+        let fragments = |rows| blended.as_ref().map_or_else(Vec::new, |blended| blended.fragments(rows));
+        self.on_threads(|shader| shader.shade_here(scene, frame, shading, window, &fragments))
     }
 
     /// As [`Shader::shade`], with the fragments of blended surfaces found by the caller: `fragments(rows)`
@@ -113,7 +122,8 @@ impl Shader {
         shading: Shading,
         fragments: impl Fn(Range<u32>) -> Vec<Fragment> + Sync,
     ) -> Image {
-        self.on_threads(|shader| shader.shade_here(scene, frame, shading, &fragments))
+        let all = Window::of(&frame.view);
+        self.on_threads(|shader| shader.shade_here(scene, frame, shading, &all, &fragments))
     }
 
     /// The blended instances that show in `frame`, which must be of `scene` in its present pose: at some pixel centre
@@ -154,16 +164,19 @@ impl Shader {
         scene: &Scene,
         frame: &Frame,
         shading: Shading,
+        window: &Window,
         fragments: &(impl Fn(Range<u32>) -> Vec<Fragment> + Sync),
     ) -> Image {
-        let (width, height) = (frame.view.width, frame.view.height);
-        let nothing = || Image { width, height, pixels: vec![[0.0; 4]; width as usize * height as usize] };
         match shading {
             Shading::Complexity => {
-                return complexity_image(frame, ComplexityPanel::Sum).unwrap_or_else(nothing);
+                let whole = complexity_image(frame, ComplexityPanel::Sum);
+                return window.picture(&frame.view, |row, x, y| {
+                    let at = y as usize * frame.view.width as usize + x as usize;
+                    whole.iter().for_each(|whole| row.copy_from_slice(&whole.pixels[at..][..row.len()]));
+                });
             }
             Shading::Ids => {
-                return each_pixel(frame, || {
+                return each_pixel(frame, window, || {
                     let mut last = (SurfaceId { instance: NO_ID, triangle: NO_ID }, [0.0; 4]);
                     move |_, _, id| {
                         if last.0 != id {
@@ -175,27 +188,27 @@ impl Shader {
             }
             Shading::Depth => {
                 let range = DepthRange::of(frame);
-                return each_pixel(frame, || |x, y, _| range.color(frame.distance(x, y)));
+                return each_pixel(frame, window, || |x, y, _| range.color(frame.distance(x, y)));
             }
             Shading::Flat | Shading::Smooth | Shading::Normals => {}
         }
-        let instances = self.instances_in(scene, frame);
+        let instances = self.instances_in(scene, frame, window);
         self.prepare_textures(scene, instances.meshes());
         if shading.shows_blended() {
             self.prepare_blended_textures(scene);
         }
         let setting = self.setting(scene, frame, shading);
-        let mut image = shade_opaque(&setting, frame, shading, &instances);
+        let mut image = shade_opaque(&setting, frame, shading, &instances, window);
         if shading.shows_blended() {
-            composite(&mut image, &setting, frame, &self.locator, fragments);
+            composite(&mut image, window.rows.start, &setting, frame, &self.locator, fragments);
         }
         image
     }
 
-    fn instances_in(&self, scene: &Scene, frame: &Frame) -> PlacedInstances {
-        let rows = (0..frame.view.height).into_par_iter();
+    fn instances_in(&self, scene: &Scene, frame: &Frame, window: &Window) -> PlacedInstances {
+        let rows = window.rows.clone().into_par_iter();
         let numbers = rows.flat_map_iter(|y| {
-            let mut row = instances_among((0..frame.view.width).filter_map(|x| frame.id(x, y)));
+            let mut row = instances_among(window.columns.clone().filter_map(|x| frame.id(x, y)));
             row.sort_unstable();
             row.dedup();
             row
@@ -225,28 +238,60 @@ pub(super) fn pixel_centre(x: u32, y: u32) -> DVec2 {
     DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5)
 }
 
+/// A part of a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Window {
+    /// Columns of pixels.
+    pub columns: Range<u32>,
+    /// Rows of pixels.
+    pub rows: Range<u32>,
+}
+
+impl Window {
+    /// All of a view's picture.
+    pub fn of(view: &View) -> Window {
+        Window { columns: 0..view.width, rows: 0..view.height }
+    }
+
+    /// The window's rows, whose columns in it `shade` colours, given the first column's number and the row's.
+    fn picture(&self, view: &View, shade: impl Fn(&mut [[f32; 4]], u32, u32) + Sync) -> Image {
+        let (width, height) = (view.width, self.rows.len() as u32);
+        let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
+        pixels.par_chunks_mut(width as usize).zip(self.rows.clone()).for_each(|(row, y)| {
+            let columns = self.columns.start as usize..self.columns.end as usize;
+            shade(&mut row[columns], self.columns.start, y);
+        });
+        Image { width, height, pixels }
+    }
+}
+
 /// A picture whose every row is coloured, from left to right, by a closure of its own.
-fn each_pixel<F: FnMut(u32, u32, SurfaceId) -> [f32; 4]>(frame: &Frame, row: impl Fn() -> F + Sync) -> Image {
-    let (width, height) = (frame.view.width, frame.view.height);
-    let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
-    pixels.par_chunks_mut(width as usize).zip(0..height).for_each(|(pixels, y)| {
+fn each_pixel<F: FnMut(u32, u32, SurfaceId) -> [f32; 4]>(
+    frame: &Frame,
+    window: &Window,
+    row: impl Fn() -> F + Sync,
+) -> Image {
+    window.picture(&frame.view, |pixels, first, y| {
         let mut color = row();
-        for (pixel, x) in pixels.iter_mut().zip(0..) {
+        for (pixel, x) in pixels.iter_mut().zip(first..) {
             if let Some(id) = frame.id(x, y) {
                 *pixel = color(x, y, id);
             }
         }
-    });
-    Image { width, height, pixels }
+    })
 }
 
-fn shade_opaque(setting: &Setting, frame: &Frame, shading: Shading, instances: &PlacedInstances) -> Image {
+fn shade_opaque(
+    setting: &Setting,
+    frame: &Frame,
+    shading: Shading,
+    instances: &PlacedInstances,
+    window: &Window,
+) -> Image {
     let world_from_view = frame.view.view_from_world.matrix3.transpose();
-    let (width, height) = (frame.view.width, frame.view.height);
-    let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
-    pixels.par_chunks_mut(width as usize).zip(0..height).for_each(|(row, y)| {
+    window.picture(&frame.view, |row, first, y| {
         let mut last: Option<(SurfaceId, SeenTriangle)> = None;
-        for (pixel, x) in row.iter_mut().zip(0..) {
+        for (pixel, x) in row.iter_mut().zip(first..) {
             let Some(id) = frame.id(x, y) else { continue };
             let (_, seen) = match last.take() {
                 Some(same) if same.0 == id => last.insert(same),
@@ -262,6 +307,5 @@ fn shade_opaque(setting: &Setting, frame: &Frame, shading: Shading, instances: &
                 _ => seen.color(setting, at).truncate().extend(1.0).to_array(),
             };
         }
-    });
-    Image { width, height, pixels }
+    })
 }
