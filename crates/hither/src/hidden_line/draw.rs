@@ -104,8 +104,10 @@ impl Preparation {
         let mut faces = Vec::new();
         if wants_faces {
             add_meetings(&tracer, options, &pieces[edges..], &mut bounds, &mut counters);
+            bounds.retain(|piece| is_on_paper(piece, picture));
             faces = find_faces(&tracer, options, &bounds, &mut pieces);
         }
+        pieces.retain(|piece| is_on_paper(piece, picture));
         counters.segments = pieces.len() as u64;
         counters.visible_segments = pieces.iter().filter(|p| p.covers == 0).count() as u64;
         coincident::draw_once(crew, &mut pieces);
@@ -325,6 +327,12 @@ fn find_faces(
         pieces.extend(hatch::lines(&faces::find(tracer, bounds, FaceColor::Flat), spacing));
     }
     options.faces.map_or_else(Vec::new, |color| faces::find(tracer, bounds, color))
+}
+
+/// Whether a piece lies on the paper. All should; but of a line whose ends are so far away that f64 cannot tell where it
+/// crosses the paper, parts may come to lie anywhere.
+fn is_on_paper(piece: &Piece, picture: DVec2) -> bool {
+    piece.ends.iter().all(|end| end.cmpge(DVec2::NEG_ONE).all() && end.cmple(picture + 1.0).all())
 }
 
 /// Whether a stroke is so short that it is rounding: what is left of a line in a corner where surfaces meet. A

@@ -235,3 +235,31 @@ fn reduced(pixels: &[[f32; 4]], w: usize, samples: u32) -> Vec<[f32; 4]> {
     })
     .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::trouble;
+
+    #[test]
+    fn a_layer_is_what_the_whole_picture_of_it_shows() {
+        let mut shown = 0;
+        for seed in 0..150 {
+            let (scene, view) = (trouble::scene(seed), trouble::view(seed));
+            let mut painter = LayerPainter::new(&scene);
+            for samples in [1, 2] {
+                let options = PaintOptions { samples, ..PaintOptions::default() };
+                for instance in 0..painter.poses.len().min(6) as u32 {
+                    let painted = painter.paint(&[instance], &view, &options).unwrap().sprite;
+                    let fine = options.fine(&view);
+                    let frame = painter.renderer.render(&painter.index, &fine, &options.render).unwrap();
+                    let image = painter.shader.shade(painter.index.scene(), &frame, options.shading);
+                    let whole = reduced(&image.pixels, fine.width as usize, samples);
+                    assert_eq!(painted, Sprite::cut(view.width, &whole), "seed {seed}, instance {instance}");
+                    shown += usize::from(!painted.is_empty());
+                }
+            }
+        }
+        assert!(shown > 100, "{shown}");
+    }
+}

@@ -41,7 +41,7 @@ impl Sprite {
         }
     }
 
-    /// Cuts a window of a whole picture.
+    /// Cuts a window of a picture, given its pixels, to those that are not transparent.
     pub(super) fn of_window(window: &Window, pixels: &[[f32; 4]]) -> Sprite {
         if pixels.is_empty() {
             return Sprite::default();

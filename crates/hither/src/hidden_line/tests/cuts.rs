@@ -5,7 +5,7 @@ use super::{all_lines, scenes};
 use crate::conventions::{Projection, View};
 use crate::reference::trouble::Random;
 use crate::scene::{AlphaMode, Material, Scene, Transform};
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec2, DVec3, Vec3, Vec4};
 
 /// Looks at a scene along −Z, 100 pixels to a unit.
 fn front(scene: &Scene) -> View {
@@ -150,6 +150,24 @@ fn a_sheet_in_a_cutting_plane_stays() {
         let drawing = draw(&scene, &[plane(DVec3::ZERO, normal)]);
         assert!((drawing.faces.iter().map(Face::area).sum::<f64>() / 1e4 - 4.0).abs() < 1e-9);
         assert_eq!(cut_area(&drawing), 0.0);
+    }
+}
+
+#[test]
+fn what_is_too_far_away_for_f64_to_tell_stays_on_the_paper() {
+    for size in [1e12, 1e14, 1e16, 1e18, 1e25f32] {
+        let scene = boxes(&[([-0.5 * size; 3], [0.5 * size; 3], false)]);
+        let preparation = Preparation::new(&scene, &PrepareOptions::default());
+        let size = f64::from(size);
+        for eye in [DVec3::new(2.7, 4.5, -1.004), DVec3::new(2.0, 3.0, 4.0) * size, DVec3::ONE * 0.2 * size] {
+            let projection = Projection::Perspective { fov_y: 0.8, near: 0.1 };
+            let view = View::look_at(eye, DVec3::ZERO, DVec3::Y, projection, (64, 48));
+            let sections = vec![plane(DVec3::X * 0.1 * size, DVec3::X)];
+            let options = LineOptions { sections, faces: Some(FaceColor::White), ..all_lines() };
+            let drawing = preparation.draw(&view, &options).unwrap();
+            let near = |p: &DVec2| (p.x - 32.0).abs() < 33.1 && (p.y - 24.0).abs() < 25.1;
+            assert!(drawing.points.iter().all(near), "{size}, {eye}: {:?}", drawing.points);
+        }
     }
 }
 
