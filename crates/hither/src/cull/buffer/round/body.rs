@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
 /// Patches of more faces are not drawn so: each tile looks at all of them.
-pub(super) const MOST_FACES: usize = 1024;
+const MOST_FACES: usize = 1024;
 
 /// Those of fewer are drawn as they are.
 const LEAST_FACES: usize = 9;
