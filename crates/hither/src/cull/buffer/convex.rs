@@ -25,7 +25,7 @@ use super::place::Placed;
 use super::silhouette::{InTile, Silhouette};
 use super::surface::Surface;
 use super::tile::{TilePlane, tile_plane};
-use fearless_simd::{Simd, f32x8, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x8, prelude::*};
 use glam::DVec3;
 
 /// No convex body has more faces, vertices (with those that fill them up) or edges.
@@ -98,21 +98,30 @@ impl ConvexBody {
         let points: Vec<DVec3> = (first..vertices.x.len())
             .map(|v| DVec3::new(vertices.x[v].into(), vertices.y[v].into(), vertices.z[v].into()))
             .collect();
-        let size = points.iter().map(|p| p.distance(points[0])).fold(0.0, f64::max);
-        (0..faces).all(|f| {
-            let [x, y, z, d] = [0, 1, 2, 3].map(|k| f64::from(self.plane[k][f]));
-            let normal = DVec3::new(x, y, z);
-            // Coordinates in f32 bound how well the plane is known.
-            let slack = size * ROUGHLY + d.abs() * 1e-6;
-            let (mut behind, mut in_front) = (0.0f64, 0.0f64);
-            for p in &points {
-                let side = normal.dot(*p) - d;
-                (behind, in_front) = (behind.min(side), in_front.max(side));
-            }
-            // Something flat has no body: its outline may be anything.
-            normal != DVec3::ZERO && in_front <= slack && behind < -slack
-        })
+        are_roughly_convex(
+            &points,
+            (0..faces).map(|f| {
+                let [x, y, z, d] = [0, 1, 2, 3].map(|k| f64::from(self.plane[k][f]));
+                (DVec3::new(x, y, z), d)
+            }),
+        )
     }
+}
+
+/// Whether faces, of which the planes' normals and offsets are given, bound a body: no point is far in front of one, and
+/// each has some far behind it. What is flat has no body: its outline may be anything.
+pub(super) fn are_roughly_convex(points: &[DVec3], mut planes: impl Iterator<Item = (DVec3, f64)>) -> bool {
+    let size = points.iter().map(|p| p.distance(points[0])).fold(0.0, f64::max);
+    planes.all(|(normal, d)| {
+        // Coordinates in f32 bound how well the plane is known.
+        let slack = size * ROUGHLY + d.abs() * 1e-6;
+        let (mut behind, mut in_front) = (0.0f64, 0.0f64);
+        for p in points {
+            let side = normal.dot(*p) - d;
+            (behind, in_front) = (behind.min(side), in_front.max(side));
+        }
+        normal != DVec3::ZERO && in_front <= slack && behind < -slack
+    })
 }
 
 /// A convex body in its place.
@@ -227,51 +236,23 @@ fn fill<S: Simd>(simd: S, surface: &mut Surface, covered: &InTile<S>, seen: &See
     if !surface.may_gain(simd, tile, covered.inner, over.highest) {
         return;
     }
-    if covered.whole && over.is_one_plane() {
-        surface.cover(simd, tile, over.plane[0]);
-        return;
-    }
-    let (planes, farthest) = (&over.plane[..over.count.min(FACES)], &over.farthest);
-    surface.raise_spans(
-        simd,
-        tile,
-        covered.spans,
-        covered.rows,
-        #[inline(always)]
-        |row| {
-            let mut least = f32x16::splat(simd, over.highest);
-            for (plane, farthest) in planes.iter().zip(farthest) {
-                least = least.min(plane.row(simd, row as i32).max(*farthest));
-            }
-            least
-        },
-        over.highest,
-    );
+    covered.raise(simd, surface, &over.planes[..over.count.min(FACES)], over.highest);
 }
 
 /// The planes that are the least somewhere in a tile. One that is nowhere below `highest` is left out: where its face
 /// covers some of a pixel, the plane, lowered, is no nearer there than the nearest corner, so that face covers nothing
 /// of the tile.
 struct OverTile {
-    plane: [TilePlane; FACES],
-    farthest: [f32; FACES],
+    /// Each with the depth of its face's farthest corner.
+    planes: [(TilePlane, f32); FACES],
     count: usize,
     /// No depth is larger.
     highest: f32,
 }
 
-impl OverTile {
-    /// Whether a single plane holds everywhere, nowhere below its face's farthest corner, nor behind everything.
-    #[inline(always)]
-    fn is_one_plane(&self) -> bool {
-        self.count == 1 && self.plane[0].min(0, 0, 15, 15) >= self.farthest[0].max(0.0)
-    }
-}
-
 #[inline(always)]
 fn over_tile(seen: &Seen, x: i32, y: i32) -> OverTile {
-    let mut over =
-        OverTile { plane: [TilePlane::ZERO; FACES], farthest: [0.0; FACES], count: 0, highest: seen.nearest };
+    let mut over = OverTile { planes: [(TilePlane::ZERO, 0.0); FACES], count: 0, highest: seen.nearest };
     let mut over_all = [(TilePlane::ZERO, 0.0); FACES];
     let count = seen.count.min(FACES);
     for ((to, plane), &farthest) in over_all[..count].iter_mut().zip(&seen.plane).zip(&seen.farthest) {
@@ -281,7 +262,7 @@ fn over_tile(seen: &Seen, x: i32, y: i32) -> OverTile {
     }
     for &(plane, farthest) in &over_all[..count] {
         if plane.min(0, 0, 15, 15).max(farthest) <= over.highest {
-            (over.plane[over.count & 7], over.farthest[over.count & 7]) = (plane, farthest);
+            over.planes[over.count & 7] = (plane, farthest);
             over.count += 1;
         }
     }

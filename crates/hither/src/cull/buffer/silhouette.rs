@@ -10,7 +10,7 @@
 
 use super::fill::{first_pixel, last_pixel};
 use super::surface::Surface;
-use super::tile::COLUMNS;
+use super::tile::{COLUMNS, TilePlane};
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
 /// No silhouette has more edges.
@@ -77,6 +77,36 @@ pub(super) struct InTile<S: Simd> {
     pub inner: [i32; 4],
     /// Whether the whole tile is covered.
     pub whole: bool,
+}
+
+impl<S: Simd> InTile<S> {
+    /// Raises what is covered of the tile to the least of some planes, each no lower than the depth beside it. No depth
+    /// is above `highest`.
+    #[inline(always)]
+    pub fn raise(&self, simd: S, surface: &mut Surface, planes: &[(TilePlane, f32)], highest: f32) {
+        let tile = surface.tile(self.at[0] >> 4, self.at[1] >> 4);
+        if let (true, &[(plane, farthest)]) = (self.whole, planes)
+            && plane.min(0, 0, 15, 15) >= farthest.max(0.0)
+        {
+            surface.cover(simd, tile, plane);
+            return;
+        }
+        surface.raise_spans(
+            simd,
+            tile,
+            self.spans,
+            self.rows,
+            #[inline(always)]
+            |row| {
+                let mut least = f32x16::splat(simd, highest);
+                for (plane, farthest) in planes {
+                    least = least.min(plane.row(simd, row as i32).max(*farthest));
+                }
+                least
+            },
+            highest,
+        );
+    }
 }
 
 impl Silhouette {

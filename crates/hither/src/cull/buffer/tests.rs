@@ -362,9 +362,9 @@ fn no_pixel_holds_more_than_is_there_on_convex_bodies() {
 #[test]
 fn convex_bodies_cover_what_their_faces_cover() {
     // A plane, lowered by what it falls within half a pixel, is below its neighbour's for about a pixel beyond their
-    // edge. At the rim of a body, and at its edges towards the eye, no block of it is there that lies nearer.
+    // edge. At the rim of a body no block of it is there that lies nearer.
     let sum = compared(1500, bodies);
-    let differ = (sum.one * 100).max(sum.nearer * 15).max(sum.farther * 50);
+    let differ = (sum.one * 100).max(sum.nearer * 25).max(sum.farther * 50);
     assert!(sum.both > 200_000 && differ < sum.both, "{sum:?}");
 }
 

@@ -4,6 +4,7 @@
 //! for each of its numbers. An edge has twelve for each end and four for each of its faces: places among sixteen, of
 //! which its pair says which.
 
+use crate::cull::buffer::convex::are_roughly_convex;
 use crate::cull::buffer::occluder::{ENDS, Face, Vertices};
 use crate::index::{Box3, blocks_of_boxes};
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
@@ -14,11 +15,8 @@ use std::ops::Range;
 /// Patches of more faces are not drawn so: each tile looks at all of them.
 const MOST_FACES: usize = 1024;
 
-/// Those of fewer are drawn as they are.
-const LEAST_FACES: usize = 9;
-
-/// How far a vertex may be in front of a face's plane, as a share of the body's size.
-const ROUGHLY: f64 = 1e-4;
+/// Those of fewer are drawn in other ways: to place their few corners costs little.
+const LEAST_FACES: usize = 17;
 
 /// Faces of four corners whose halves differ by more (the length between their normals) become two.
 const FLAT: f64 = 1e-3;
@@ -100,7 +98,12 @@ impl RoundBodies {
         let vertex: Vec<[f32; 3]> = (first_vertex as usize..vertices.x.len()).map(corner).collect();
         let points: Vec<DVec3> = vertex.iter().map(|p| DVec3::from_array(p.map(f64::from))).collect();
         let mut polygons = flat(faces, &points);
-        if polygons.len() > MOST_FACES || !are_roughly_convex(&polygons, &points) {
+        let planes = polygons.iter().map(|polygon| {
+            let [normal, second] = normals(polygon, &points);
+            let normal = if second == DVec3::ZERO { second } else { normal };
+            (normal, normal.dot(points[usize::from(polygon.corner[0])]))
+        });
+        if polygons.len() > MOST_FACES || !are_roughly_convex(&points, planes) {
             return None;
         }
         sort(&mut polygons, &points);
@@ -187,21 +190,6 @@ fn normals(polygon: &Polygon, points: &[DVec3]) -> [DVec3; 2] {
     let first = (b - a).cross(c - a).normalize_or_zero();
     let second = (c - a).cross(d - a).normalize_or_zero();
     if polygon.corners == 3 { [first; 2] } else { [first, second] }
-}
-
-/// Whether no corner is far in front of a face, and all faces have some behind them.
-fn are_roughly_convex(polygons: &[Polygon], points: &[DVec3]) -> bool {
-    let size = points.iter().map(|p| p.distance(points[0])).fold(0.0, f64::max);
-    let slack = size * ROUGHLY;
-    polygons.iter().all(|polygon| {
-        let [normal, second] = normals(polygon, points);
-        let d = normal.dot(points[usize::from(polygon.corner[0])]);
-        let side = |p: &DVec3| normal.dot(*p) - d;
-        normal != DVec3::ZERO
-            && second != DVec3::ZERO
-            && points.iter().all(|p| side(p) <= slack)
-            && points.iter().any(|p| side(p) < -slack)
-    })
 }
 
 /// Brings those together that lie together, so that sixteen of them mostly turn the same way.

@@ -25,7 +25,7 @@
 //! magnitudes: numerators anywhere in the patch by δ, together, s by σ. So the quotient is off by less than
 //! `(δ + |depth|·σ) / (s − σ)`. Where s is less than 8σ the plane does not count.
 //!
-//! Half of the time goes into reading the bodies: see [`body`].
+//! Nearly half of the time is waiting for what is known of the bodies: see [`body`].
 
 mod body;
 
@@ -393,27 +393,7 @@ fn fill<S: Simd>(
         return;
     }
     let planes = few_planes(seen, &over.which[..over.count], from);
-    let (first, farthest) = planes[0];
-    if covered.whole && over.count == 1 && first.min(0, 0, 15, 15) >= farthest.max(0.0) {
-        surface.cover(simd, tile, first);
-        return;
-    }
-    let planes = &planes[..over.count];
-    surface.raise_spans(
-        simd,
-        tile,
-        covered.spans,
-        covered.rows,
-        #[inline(always)]
-        |row| {
-            let mut least = f32x16::splat(simd, highest);
-            for (plane, farthest) in planes {
-                least = least.min(plane.row(simd, row as i32).max(*farthest));
-            }
-            least
-        },
-        highest,
-    );
+    covered.raise(simd, surface, &planes[..over.count], highest);
 }
 
 /// The columns of each row that are covered.
