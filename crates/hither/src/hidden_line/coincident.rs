@@ -6,6 +6,7 @@
 //! important still, so nothing is lost.
 
 use super::crew::Crew;
+use super::Kind;
 use super::draw::Piece;
 use super::grid::{Grid, Places, Sorted};
 use glam::DVec2;
@@ -20,19 +21,18 @@ const SHORTEST_PX: f64 = 1e-6;
 
 /// The longest side of the grid, cells.
 const MOST_CELLS: usize = 4096;
-/// Where a cell has more pieces than this, twins must be suspected.
-const CROWD: u32 = 128;
+/// The shortest side of a cell, pixels: of smaller ones a piece would be in several for nothing.
+const LEAST_CELL_PX: f64 = 4.0 * NEAR_PX;
+/// Where a cell has more pieces than this, most are likely to lie on one another.
+const CROWD: usize = 128;
 
 /// Takes away what is drawn already.
 pub(super) fn draw_once(crew: Crew, pieces: &mut Vec<Piece>) {
     if pieces.len() < 2 {
         return;
     }
-    let sort = |laid: &Laid| Sorted::on(crew, &laid.grid, laid);
-    let mut cells = sort(&Laid::new(crew, pieces));
-    if cells.most() > CROWD && drop_twins(pieces, &cells) {
-        cells = sort(&Laid::new(crew, pieces));
-    }
+    let laid = Laid::new(crew, pieces);
+    let cells = Sorted::on(crew, &laid.grid, &laid);
     let mut lines = Vec::new();
     crew.extend(&mut lines, pieces.len(), |i| Line::of(&pieces[i]));
     let shares = crew.shares(cells.len(), 16);
@@ -76,12 +76,16 @@ fn overlaps(cells: &Sorted, range: Range<usize>, pieces: &[Piece], lines: &[Line
     for cell in range {
         here.clear();
         here.extend(cells.in_cell(cell).iter().map(|&i| (i, lines[i as usize])));
+        if here.len() > CROWD {
+            overlaps_in_crowd(&mut here, pieces, &mut found);
+            continue;
+        }
         for (k, (i, a)) in here.iter().enumerate() {
             for (j, b) in &here[k + 1..] {
                 if !a.is_aligned(b) {
                     continue;
                 }
-                let first_stays = outranks(pieces, *i as usize, *j as usize);
+                let first_stays = rank(pieces, *i) < rank(pieces, *j);
                 let (under, low, over) = if first_stays { (b, j, a) } else { (a, i, b) };
                 if let Some((from, to)) = under.overlap(over) {
                     found.push((*low, from, to));
@@ -92,36 +96,34 @@ fn overlaps(cells: &Sorted, range: Range<usize>, pieces: &[Piece], lines: &[Line
     found
 }
 
-/// Of pieces with the same ends in crowded cells only the most important stays: so many on one another would be
-/// compared each with each. Whether there were any.
-fn drop_twins(pieces: &mut Vec<Piece>, cells: &Sorted) -> bool {
-    let key = |i: &u32| {
-        let p = &pieces[*i as usize];
-        let ends = p.ends.map(|e| (e + 0.0).to_array().map(f64::to_bits));
-        [ends[0].min(ends[1]), ends[0].max(ends[1])]
-    };
-    let crowds = (0..cells.len()).map(|cell| cells.in_cell(cell)).filter(|list| list.len() > CROWD as usize);
-    let mut suspects: Vec<u32> = crowds.flatten().copied().collect();
-    suspects.sort_unstable();
-    suspects.dedup();
-    suspects.sort_by_cached_key(|i| {
-        let p = &pieces[*i as usize];
-        (key(i), p.covers, p.kind, p.part)
-    });
-    let mut is_twin = vec![false; pieces.len()];
-    for same in suspects.chunk_by(|a, b| key(a) == key(b)) {
-        same[1..].iter().for_each(|&i| is_twin[i as usize] = true);
+/// The same for a cell of very many pieces: they come by rank, and what others cover wholly is compared with
+/// nothing more. A scene as small as a pixel has all of its pieces in a few cells.
+fn overlaps_in_crowd(here: &mut [(u32, Line)], pieces: &[Piece], found: &mut Vec<(u32, f64, f64)>) {
+    here.sort_unstable_by_key(|&(i, _)| rank(pieces, i));
+    let mut drawn: Vec<Line> = Vec::new();
+    for &mut (i, line) in here {
+        let before = found.len();
+        for over in drawn.iter().filter(|over| line.is_aligned(over)) {
+            if let Some((from, to)) = line.overlap(over) {
+                found.push((i, from, to));
+                if to - from >= line.length - SHORTEST_PX {
+                    break;
+                }
+            }
+        }
+        let covers = &mut found[before..];
+        covers.sort_unstable_by(|a, b| a.1.total_cmp(&b.1));
+        let at = covers.iter().fold(0.0f64, |at, o| if o.1 - at <= SHORTEST_PX { at.max(o.2) } else { at });
+        if line.length - at > SHORTEST_PX {
+            drawn.push(line);
+        }
     }
-    let before = pieces.len();
-    let mut twin = is_twin.into_iter();
-    pieces.retain(|_| twin.next() != Some(true));
-    pieces.len() < before
 }
 
-/// Whether piece `a` is kept where it coincides with piece `b`.
-fn outranks(pieces: &[Piece], a: usize, b: usize) -> bool {
-    let rank = |i: usize| (pieces[i].covers, pieces[i].kind, pieces[i].part, i);
-    rank(a) < rank(b)
+/// Of pieces that coincide the one with the least of these is kept.
+fn rank(pieces: &[Piece], i: u32) -> (u32, Kind, u32, u32) {
+    let piece = &pieces[i as usize];
+    (piece.covers, piece.kind, piece.part, i)
 }
 
 /// A piece as a ray with a length.
@@ -187,7 +189,9 @@ impl Laid<'_> {
         let ends = || pieces.iter().flat_map(|p| p.ends);
         let min = ends().fold(DVec2::INFINITY, DVec2::min);
         let max = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
-        let grid = Grid::over(min, max, (((pieces.len() as f64).sqrt() * 0.7) as usize + 4).min(MOST_CELLS));
+        let side = (((pieces.len() as f64).sqrt() * 0.7) as usize + 4).min(MOST_CELLS);
+        let most = ((max - min).max_element() / LEAST_CELL_PX) as usize;
+        let grid = Grid::over(min, max, side.min(most).max(1));
         let mut rows = Vec::new();
         crew.extend(&mut rows, pieces.len(), |i| {
             let [a, b] = pieces[i].ends;
@@ -236,8 +240,9 @@ impl Places for Laid<'_> {
 mod tests {
     use super::*;
 
+    use crate::reference::trouble::Random;
+
     const ONE: Crew = Crew { threads: 1 };
-    use crate::hidden_line::Kind;
 
     fn piece(part: u32, a: [f64; 2], b: [f64; 2], kind: Kind, covers: u32) -> Piece {
         Piece { ends: [a.into(), b.into()], part, kind, covers }
@@ -266,6 +271,50 @@ mod tests {
         let mut pieces = vec![piece(3, [1.0, 1.0], [9.0, 5.0], Kind::Crease, 0); 1000];
         draw_once(ONE, &mut pieces);
         assert_eq!(pieces.len(), 1);
+    }
+
+    /// Pieces at random on five lines through a point, and how long the visible ones and all together should be.
+    fn on_five_lines(count: usize, size: f64) -> (Vec<Piece>, [f64; 2]) {
+        let mut random = Random::new(7);
+        let rays = [0.0f64, 0.5, 1.0, 1.7, 2.4].map(|angle| DVec2::from_angle(angle) * size);
+        let (mut pieces, mut stretches) = (Vec::new(), [Vec::new(), Vec::new()]);
+        for i in 0..count {
+            let (ray, covers) = (i % 5, random.below(2));
+            let from = 0.1 + 0.7 * random.unit();
+            let ends = [from, from + 0.02 * random.unit()];
+            let [a, b] = ends.map(|t| (rays[ray] * t).to_array());
+            pieces.push(piece(random.below(9), a, b, Kind::Crease, covers));
+            (covers as usize..2).for_each(|k| stretches[k].push(ends.map(|t| ray as f64 + t)));
+        }
+        let union = |mut stretches: Vec<[f64; 2]>| -> f64 {
+            stretches.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+            let (mut sum, mut end) = (0.0, 0.0f64);
+            for [from, to] in stretches {
+                sum += (to - from.max(end)).max(0.0);
+                end = end.max(to);
+            }
+            sum * size
+        };
+        (pieces, stretches.map(union))
+    }
+
+    #[test]
+    fn pieces_that_overlap_are_drawn_once_also_in_a_crowd() {
+        for (count, size) in [(3_000, 1000.0), (30_000, 0.2)] {
+            let (mut pieces, [of_visible, of_all]) = on_five_lines(count, size);
+            draw_once(ONE, &mut pieces);
+            let visible: Vec<Piece> = pieces.iter().copied().filter(|p| p.covers == 0).collect();
+            let tolerance = count as f64 * SHORTEST_PX;
+            assert!((length(&visible) - of_visible).abs() < tolerance, "{} {of_visible}", length(&visible));
+            assert!((length(&pieces) - of_all).abs() < tolerance, "{} {of_all}", length(&pieces));
+        }
+    }
+
+    #[test]
+    fn of_a_drawing_that_is_one_speck_little_is_drawn() {
+        let (mut pieces, _) = on_five_lines(100_000, 1e-3);
+        draw_once(ONE, &mut pieces);
+        assert!(!pieces.is_empty() && pieces.len() < 10_000, "{}", pieces.len());
     }
 
     #[test]

@@ -146,11 +146,6 @@ impl Sorted {
     pub fn len(&self) -> usize {
         self.starts.len() - 1
     }
-
-    /// The most things that a cell has.
-    pub fn most(&self) -> u32 {
-        self.starts.windows(2).map(|w| w[1] - w[0]).max().unwrap_or_default()
-    }
 }
 
 /// The smallest rectangle around projected points.
