@@ -4,7 +4,8 @@
 //! it, and every predicate is exact. What is done here: lines that end *on* another line, computed in
 //! floating point, are made a little longer, so that they do cross it; what then sticks out cuts nothing. Ends that
 //! rounding has put apart become one, and an end that is alone is given a hook, which meets also a line that runs beside
-//! its own: between two that do not meet, what is on one side would leak to the other.
+//! its own, and bridges to the ends around it: between two that do not meet, what is on one side would leak to the
+//! other. Lines too many do no harm: they cut a region in two, which show the same.
 
 use glam::DVec2;
 use i_overlay::core::fill_rule::FillRule;
@@ -19,6 +20,14 @@ const LONGER: f64 = 1e-6;
 /// The side of the cells, pixels, in which all ends become one. More than rounding, less than [`LONGER`].
 const SAME: f64 = 1e-7;
 
+/// An end that is alone is joined to those that are so near, pixels. Where surfaces meet almost at an edge, the edge is
+/// seen up to where depths are the same but for rounding, and the meeting begins where they are the same: so far apart
+/// may they be.
+const BRIDGED: f64 = 0.01;
+
+/// Of more ends around one that is alone no more than these are joined to it.
+const MOST_BRIDGES: usize = 8;
+
 /// A polygon: its outline, then its holes. Closed, without repeating the first point.
 pub(super) type Polygon = Vec<Vec<DVec2>>;
 
@@ -30,6 +39,7 @@ pub(super) fn cut(min: DVec2, max: DVec2, lines: impl Iterator<Item = [DVec2; 2]
     let mut lines_at = vec![0u32; ends.points.len()];
     lines.iter().filter(|[a, b]| a != b).flatten().for_each(|&end| lines_at[end as usize] += 1);
     let is_alone = |end: u32| lines_at[end as usize] == 1;
+    let bridges = bridges(&ends.points, is_alone);
     let paths: Vec<Vec<[f64; 2]>> = lines
         .into_iter()
         .filter(|[a, b]| a != b)
@@ -41,6 +51,7 @@ pub(super) fn cut(min: DVec2, max: DVec2, lines: impl Iterator<Item = [DVec2; 2]
             path.extend(beyond(to, more, is_alone(b)).into_iter().rev());
             path.into_iter().map(|p| p.to_array()).collect()
         })
+        .chain(bridges.iter().map(|bridge| bridge.map(|p| p.to_array()).to_vec()))
         .collect();
     if paths.is_empty() {
         return vec![vec![outline.into_iter().map(DVec2::from).collect()]];
@@ -53,6 +64,23 @@ pub(super) fn cut(min: DVec2, max: DVec2, lines: impl Iterator<Item = [DVec2; 2]
 fn beyond(end: DVec2, more: DVec2, hooked: bool) -> Vec<DVec2> {
     let aside = more.perp();
     if hooked { vec![end + more - aside, end + more + aside] } else { vec![end + more] }
+}
+
+/// Lines from ends that are alone to those around them.
+fn bridges(ends: &[DVec2], is_alone: impl Fn(u32) -> bool) -> Vec<[DVec2; 2]> {
+    let cell = |p: DVec2| (p / BRIDGED).floor().to_array().map(|c| c as i64);
+    let mut in_cell: HashMap<[i64; 2], Vec<u32>> = HashMap::new();
+    for (i, &end) in ends.iter().enumerate() {
+        in_cell.entry(cell(end)).or_default().push(i as u32);
+    }
+    let mut bridges = Vec::new();
+    for (i, &end) in ends.iter().enumerate().filter(|&(i, _)| is_alone(i as u32)) {
+        let [x, y] = cell(end);
+        let around = (0..9).filter_map(|k| in_cell.get(&[x + k % 3 - 1, y + k / 3 - 1])).flatten();
+        let near = around.filter(|&&j| j as usize != i && ends[j as usize].distance(end) <= BRIDGED);
+        bridges.extend(near.take(MOST_BRIDGES).map(|&j| [end, ends[j as usize]]));
+    }
+    bridges
 }
 
 /// Ends of lines: those in a cell of a grid, and in its neighbours nearer than half a cell's side, are one.
@@ -196,6 +224,20 @@ mod tests {
                     assert!(areas.len() == 2 && areas[0] > 40.0, "{slope} {off} {left} {right}: {areas:?}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn where_three_lines_almost_meet_nothing_leaks() {
+        let v = DVec2::new;
+        let middle = v(5.0, 5.0);
+        for gap in [5e-6, 1e-4, 0.009] {
+            // Two meet in the middle, the third begins beside it, on what would be the first one's way.
+            let lines = [[v(5.0, 11.0), middle], [v(-1.0, 4.0), middle], [v(5.0, 5.0 - gap), v(11.0, 4.5)]];
+            let regions = cut(v(0., 0.), v(10., 10.), lines.into_iter());
+            let mut areas: Vec<f64> = regions.iter().map(area).filter(|a| *a > 1e-3).collect();
+            areas.sort_by(f64::total_cmp);
+            assert!(areas.len() == 3 && areas[2] < 50.0, "{gap}: {areas:?}");
         }
     }
 
