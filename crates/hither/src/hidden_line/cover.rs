@@ -52,9 +52,22 @@ impl Cover {
         })
     }
 
-    /// What is farther than this is hidden in a cell.
-    pub fn bound(&self, cell: usize) -> f64 {
-        self.bound[cell]
+    /// Whether what a triangle may have in a cell is hidden.
+    pub fn hides_in(&self, cell: usize, &[a, b, c]: &[DVec3; 3]) -> bool {
+        let bound = self.bound[cell];
+        if bound > a.z.max(b.z).max(c.z) {
+            return true;
+        }
+        if bound <= a.z.min(b.z).min(c.z) {
+            return false;
+        }
+        // Of slivers rounding leaves too little to tell which way they are inclined.
+        let [p, q] = [b - a, c - a].map(DVec3::truncate);
+        if p.perp_dot(q).abs() < 1e-6 * p.length_squared().max(q.length_squared()) {
+            return false;
+        }
+        let center = self.grid.center(cell % self.grid.columns, cell / self.grid.columns);
+        Plane::through(a, b, c).most(center, self.reach(center)) < bound
     }
 
     /// Finds the cells in which nothing but the surface that gave them their bound is nearer than it: no line
@@ -394,6 +407,13 @@ impl Plane {
 
     pub fn at(&self, p: DVec2) -> f64 {
         self.at.z + self.slope.dot(p - self.at.truncate())
+    }
+
+    /// The largest value within the square; NaN or ∞ for a plane seen edge-on.
+    fn most(&self, center: DVec2, reach: f64) -> f64 {
+        let middle = self.at(center);
+        let error = middle.abs() * 1e-12;
+        middle + (self.slope.x.abs() + self.slope.y.abs()) * reach + error
     }
 
     /// The smallest value within the square; NaN or −∞ for a plane seen edge-on.

@@ -182,7 +182,7 @@ impl Places for Binning<'_> {
                 let o = &self.list[i];
                 let (first, last) = columns_in_row(&self.shown.corners(o.triangle), grid, row);
                 for cell in grid.index(first, row)..=grid.index(last, row) {
-                    if self.cover.is_none_or(|c| c.bound(cell) <= f64::from(o.nearest)) {
+                    if !self.cover.is_some_and(|c| c.hides_in(cell, &self.shown.corners(o.triangle))) {
                         visit(cell - start, i);
                     }
                 }

@@ -90,3 +90,27 @@ fn backs_that_are_left_out_change_nothing() {
         }
     }
 }
+
+#[test]
+fn what_lies_within_a_box_neither_shows_nor_costs() {
+    let mut random = Random::new(3);
+    let mut scene = Scene::new("chest");
+    scenes::add_box(&mut scene, "chest", [-1.0; 3], [1.0; 3]);
+    let alone = Preparation::new(&scene, &PrepareOptions::default());
+    let count = 300;
+    for _ in 0..count {
+        let (p, q) = (random.point(0.49).as_vec3(), random.point(0.49).as_vec3());
+        scenes::add_box(&mut scene, "within", (p - 0.5).to_array(), (q + 0.5).to_array());
+    }
+    let full = Preparation::new(&scene, &PrepareOptions::default());
+    let views = scenes::views(&scene);
+    // The last eye is inside.
+    for view in &views[..views.len() - 1] {
+        let (alone, full) =
+            (alone.draw(view, &all_lines()).unwrap(), full.draw(view, &all_lines()).unwrap());
+        let difference = (alone.visible_length() - full.visible_length()).abs();
+        assert!(difference < 1e-3, "{} and {}", alone.visible_length(), full.visible_length());
+        // Six triangles of each box turn to the eye; not each is tried with each, in each cell.
+        assert!(full.counters.pairs < 1000 * count, "{}", full.counters.pairs);
+    }
+}
