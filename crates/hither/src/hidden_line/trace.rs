@@ -43,6 +43,8 @@ pub(super) struct Scratch {
     tried: Vec<u32>,
     stamp: u32,
     hidden: Vec<Hidden>,
+    /// Of the stretch that is looked at, what is before the first of these parameters and from the second on is hidden.
+    open: (f64, f64),
     events: Vec<(f64, i32)>,
     /// The answer.
     pub parts: Vec<Part>,
@@ -56,9 +58,45 @@ impl Scratch {
             tried: vec![0; occluders.list.len()],
             stamp: 0,
             hidden: Vec::new(),
+            open: (0.0, 1.0),
             events: Vec::new(),
             parts: Vec::new(),
             tests: 0,
+        }
+    }
+
+    /// Begins a stretch of the line; whether it is known to be hidden.
+    fn open(&mut self, from: f64, to: f64) -> bool {
+        self.open = (from, to);
+        self.close_by_last()
+    }
+
+    /// Notes a hidden part; whether the stretch is known to be hidden now.
+    fn hide(&mut self, part: Hidden) -> bool {
+        let before = self.open;
+        self.close(part);
+        let closed = self.open.0 >= self.open.1 || (self.open != before && self.close_by_last());
+        self.hidden.push(part);
+        closed
+    }
+
+    /// Lets the last hidden parts close the stretch, as far as they do; whether they do.
+    fn close_by_last(&mut self) -> bool {
+        /// More are not worth the time.
+        const LAST: usize = 8;
+        for k in (self.hidden.len().saturating_sub(LAST)..self.hidden.len()).rev() {
+            self.close(self.hidden[k]);
+        }
+        self.open.0 >= self.open.1
+    }
+
+    #[inline(always)]
+    fn close(&mut self, part: Hidden) {
+        if part.from <= self.open.0 {
+            self.open.0 = self.open.0.max(part.to);
+        }
+        if part.to >= self.open.1 {
+            self.open.1 = self.open.1.min(part.from);
         }
     }
 }
@@ -106,7 +144,7 @@ impl Tracer<'_> {
         }
     }
 
-    /// Cuts the line where it crosses columns (axis 0) or rows (axis 1); true if all of it is hidden.
+    /// Cuts the line where it crosses columns (axis 0) or rows (axis 1); true if all of it is known to be hidden.
     fn follow(
         &self,
         line: &Line,
@@ -119,7 +157,7 @@ impl Tracer<'_> {
         let index = |x: f64| if axis == 0 { grid.column(x) } else { grid.row(x) };
         let border = |i: usize| grid.origin[axis] + i as f64 * grid.size;
         let (mut cell, last) = (index(from + (to - from) * line.start), index(from + (to - from) * line.end));
-        let mut t = line.start;
+        let (mut t, mut hidden) = (line.start, true);
         loop {
             let next = if cell == last {
                 line.end
@@ -127,11 +165,10 @@ impl Tracer<'_> {
                 let x = border(if to > from { cell + 1 } else { cell });
                 ((x - from) / (to - from)).clamp(t, line.end)
             };
-            if self.slab(line, (t, next), Some((axis, cell)), own, scratch) {
-                return true;
-            }
-            if cell == last {
-                return false;
+            hidden &= self.slab(line, (t, next), Some((axis, cell)), own, scratch);
+            let whole = |h: &Hidden| h.from <= line.start && h.to >= line.end;
+            if cell == last || (hidden && scratch.hidden.last().is_some_and(whole)) {
+                return hidden;
             }
             cell = if to > from { cell + 1 } else { cell - 1 };
             t = next;
@@ -139,7 +176,7 @@ impl Tracer<'_> {
     }
 
     /// Tries the triangles of the cells that the line touches between two parameters, of one column (axis 0)
-    /// or row (axis 1) if `strip` says so; true if one of them hides the whole line.
+    /// or row (axis 1) if `strip` says so; true if what is between them is known to be hidden.
     fn slab(
         &self,
         line: &Line,
@@ -160,14 +197,14 @@ impl Tracer<'_> {
             Some((_, row)) => cells.rows = (row, row),
             None => {}
         }
+        let stops = !self.counts;
+        if scratch.open(t0, t1) && stops {
+            return true;
+        }
         if let Some(cover) = self.cover
             && cover.hides(cells, a.z.max(b.z))
         {
-            if t0 == line.start && t1 == line.end {
-                return true;
-            }
-            scratch.hidden.push(Hidden { from: t0, to: t1 });
-            return false;
+            return scratch.hide(Hidden { from: t0, to: t1 });
         }
         if own.anchored
             && let Some(cover) = self.cover
@@ -198,10 +235,9 @@ impl Tracer<'_> {
                     let Some(hidden) = hidden_part(self.shown, line.p, line.q, occluder.triangle) else {
                         continue;
                     };
-                    if !self.counts && hidden.from <= line.start && hidden.to >= line.end {
+                    if scratch.hide(hidden) && stops {
                         return true;
                     }
-                    scratch.hidden.push(hidden);
                 }
             }
         }
@@ -301,6 +337,7 @@ mod tests {
             tried: Vec::new(),
             stamp: 0,
             hidden: hidden.iter().map(|&(from, to)| Hidden { from, to }).collect(),
+            open: (0.0, 1.0),
             events: Vec::new(),
             parts: Vec::new(),
             tests: 0,
@@ -316,6 +353,26 @@ mod tests {
         let mut s = scratch(&[(0.0, 0.5), (0.5, 1.0)]);
         visible(0.0, 1.0, 1e-9, &mut s);
         assert!(s.parts.is_empty());
+    }
+
+    #[test]
+    fn what_is_known_to_be_hidden_shows_nowhere() {
+        use crate::reference::trouble::Random;
+        let mut random = Random::new(5);
+        let mut known = 0;
+        for _ in 0..2000 {
+            let mut s = scratch(&[]);
+            let mut closed = s.open(0.2, 0.8);
+            for _ in 0..12 {
+                let (a, b) = (f64::from(random.below(11)) * 0.1, f64::from(random.below(11)) * 0.1);
+                closed |= s.hide(Hidden { from: a.min(b), to: a.max(b) });
+                s.parts.clear();
+                visible(0.2, 0.8, 0.0, &mut s);
+                assert!(!closed || s.parts.is_empty());
+            }
+            known += u32::from(closed);
+        }
+        assert!(known > 1000, "{known}");
     }
 
     #[test]
