@@ -20,10 +20,11 @@ const LONGER: f64 = 1e-6;
 /// The side of the cells, pixels, in which all ends become one. More than rounding, less than [`LONGER`].
 const SAME: f64 = 1e-7;
 
-/// An end that is alone is joined to those that are so near, pixels. Where surfaces meet almost at an edge, the edge is
-/// seen up to where depths are the same but for rounding, and the meeting begins where they are the same: so far apart
-/// may they be.
+/// An end that is alone is joined to those that are so near, pixels, or nearer than the caller says.
 const BRIDGED: f64 = 0.01;
+
+/// The farthest that the caller may say, pixels.
+const FARTHEST_BRIDGED: f64 = 2.0;
 
 /// Of more ends around one that is alone no more than these are joined to it.
 const MOST_BRIDGES: usize = 8;
@@ -31,15 +32,19 @@ const MOST_BRIDGES: usize = 8;
 /// A polygon: its outline, then its holes. Closed, without repeating the first point.
 pub(super) type Polygon = Vec<Vec<DVec2>>;
 
-/// Cuts the rectangle from `min` to `max` along the lines.
-pub(super) fn cut(min: DVec2, max: DVec2, lines: impl Iterator<Item = [DVec2; 2]>) -> Vec<Polygon> {
+/// Cuts the rectangle from `min` to `max` along the lines. Ends may be apart by as much as `gap` says for a point.
+pub(super) fn cut(
+    [min, max]: [DVec2; 2],
+    lines: impl Iterator<Item = [DVec2; 2]>,
+    gap: impl Fn(DVec2) -> f64,
+) -> Vec<Polygon> {
     let outline = vec![[min.x, min.y], [max.x, min.y], [max.x, max.y], [min.x, max.y]];
     let mut ends = Ends::default();
     let lines: Vec<[u32; 2]> = lines.map(|line| line.map(|end| ends.name(end))).collect();
     let mut lines_at = vec![0u32; ends.points.len()];
     lines.iter().filter(|[a, b]| a != b).flatten().for_each(|&end| lines_at[end as usize] += 1);
     let is_alone = |end: u32| lines_at[end as usize] == 1;
-    let bridges = bridges(&ends.points, is_alone);
+    let bridges = bridges(&ends.points, is_alone, gap);
     let paths: Vec<Vec<[f64; 2]>> = lines
         .into_iter()
         .filter(|[a, b]| a != b)
@@ -67,18 +72,40 @@ fn beyond(end: DVec2, more: DVec2, hooked: bool) -> Vec<DVec2> {
 }
 
 /// Lines from ends that are alone to those around them.
-fn bridges(ends: &[DVec2], is_alone: impl Fn(u32) -> bool) -> Vec<[DVec2; 2]> {
-    let cell = |p: DVec2| (p / BRIDGED).floor().to_array().map(|c| c as i64);
-    let mut in_cell: HashMap<[i64; 2], Vec<u32>> = HashMap::new();
-    for (i, &end) in ends.iter().enumerate() {
-        in_cell.entry(cell(end)).or_default().push(i as u32);
-    }
+fn bridges(ends: &[DVec2], is_alone: impl Fn(u32) -> bool, gap: impl Fn(DVec2) -> f64) -> Vec<[DVec2; 2]> {
+    /// Of the ends in a cell no more are looked at.
+    const MOST_IN_CELL: usize = 64;
+    let alone = ends.iter().enumerate().filter(|&(i, _)| is_alone(i as u32));
+    let mut alone: Vec<(u32, f64)> =
+        alone.map(|(i, &end)| (i as u32, gap(end).clamp(BRIDGED, FARTHEST_BRIDGED))).collect();
     let mut bridges = Vec::new();
-    for (i, &end) in ends.iter().enumerate().filter(|&(i, _)| is_alone(i as u32)) {
-        let [x, y] = cell(end);
-        let around = (0..9).filter_map(|k| in_cell.get(&[x + k % 3 - 1, y + k / 3 - 1])).flatten();
-        let near = around.filter(|&&j| j as usize != i && ends[j as usize].distance(end) <= BRIDGED);
-        bridges.extend(near.take(MOST_BRIDGES).map(|&j| [end, ends[j as usize]]));
+    // Cells grow until there are enough ends in them, or none can be near enough.
+    let mut side = BRIDGED;
+    while !alone.is_empty() {
+        let cell = |p: DVec2| (p / side).floor().to_array().map(|c| c as i64);
+        let mut in_cell: HashMap<[i64; 2], Vec<u32>> = HashMap::new();
+        for (i, &end) in ends.iter().enumerate() {
+            let list = in_cell.entry(cell(end)).or_default();
+            if list.len() < MOST_IN_CELL {
+                list.push(i as u32);
+            }
+        }
+        alone.retain(|&(i, gap)| {
+            let end = ends[i as usize];
+            let [x, y] = cell(end);
+            let around = (0..9).filter_map(|k| in_cell.get(&[x + k % 3 - 1, y + k / 3 - 1])).flatten();
+            let mut near: Vec<(f64, u32)> = around
+                .map(|&j| (ends[j as usize].distance(end), j))
+                .filter(|&(distance, j)| j != i && distance <= gap.min(side))
+                .collect();
+            if near.len() < MOST_BRIDGES && gap > side {
+                return true;
+            }
+            near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+            bridges.extend(near.iter().take(MOST_BRIDGES).map(|&(_, j)| [end, ends[j as usize]]));
+            false
+        });
+        side *= 4.0;
     }
     bridges
 }
@@ -143,9 +170,9 @@ fn polygons(shapes: Vec<Vec<Vec<[f64; 2]>>>) -> Vec<Polygon> {
     shapes.into_iter().map(polygon).collect()
 }
 
-/// A point well inside a polygon: the middle of the widest stretch on some horizontal lines through it.
-/// `None` if it is too thin to have one.
-pub(super) fn point_inside(polygon: &Polygon) -> Option<DVec2> {
+/// Points well inside a polygon, first the middle of the widest stretch on some horizontal lines through it, last what is
+/// nearer to the ends of stretches. None if it is too thin to have one.
+pub(super) fn points_inside(polygon: &Polygon) -> Vec<DVec2> {
     /// Horizontal lines that are tried.
     const LINES: usize = 7;
     let mut heights: Vec<f64> = polygon.iter().flatten().map(|p| p.y).collect();
@@ -153,17 +180,19 @@ pub(super) fn point_inside(polygon: &Polygon) -> Option<DVec2> {
     heights.dedup();
     let mut bands: Vec<[f64; 2]> = heights.windows(2).map(|w| [w[0], w[1]]).collect();
     bands.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
-    let mut best: Option<(f64, DVec2)> = None;
+    let mut found: Vec<(f64, [DVec2; 3])> = Vec::new();
     for [low, high] in bands.into_iter().take(LINES) {
         let y = 0.5 * (low + high);
         for [from, to] in stretches(polygon, y) {
             let room = (to - from).min(high - low);
-            if room > 0.0 && best.is_none_or(|b| room > b.0) {
-                best = Some((room, DVec2::new(0.5 * (from + to), y)));
+            if room > 0.0 {
+                found.push((room, [0.5, 0.1, 0.9].map(|t| DVec2::new(from + (to - from) * t, y))));
             }
         }
     }
-    best.map(|b| b.1)
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let place = |k: usize| found.iter().map(move |(_, points)| points[k]);
+    place(0).chain(place(1)).chain(place(2)).collect()
 }
 
 /// Where a horizontal line is inside a polygon, from left to right.
@@ -199,7 +228,7 @@ mod tests {
         let mut lines: Vec<[DVec2; 2]> = (0..4).map(|i| [island[i], island[(i + 1) % 4]]).collect();
         // One that cuts, one that ends on it from below, short by rounding, and one that cuts nothing.
         lines.extend([[v(0., 7.), v(10., 7.)], [v(7., 7. - 1e-13), v(7., 0.)], [v(5., 8.), v(6., 9.)]]);
-        let regions = cut(v(0., 0.), v(10., 10.), lines.into_iter());
+        let regions = cut([v(0., 0.), v(10., 10.)], lines.into_iter(), |_| 0.0);
         let mut areas: Vec<f64> = regions.iter().map(area).collect();
         areas.sort_by(f64::total_cmp);
         assert_eq!(areas.len(), 4);
@@ -218,7 +247,7 @@ mod tests {
                 // One goes on where the other ends; and each a way beside the other.
                 for [left, right] in [[4.0, 4.0], [4.0 + 1e-12, 4.0], [4.5, 3.5]] {
                     let lines = [[at(-1.0, 0.0), at(left, 0.0)], [at(right, off), at(11.0, off)]];
-                    let regions = cut(min, max, lines.into_iter());
+                    let regions = cut([min, max], lines.into_iter(), |_| 0.0);
                     let mut areas: Vec<f64> = regions.iter().map(area).filter(|a| *a > 1e-6).collect();
                     areas.sort_by(f64::total_cmp);
                     assert!(areas.len() == 2 && areas[0] > 40.0, "{slope} {off} {left} {right}: {areas:?}");
@@ -231,10 +260,10 @@ mod tests {
     fn where_three_lines_almost_meet_nothing_leaks() {
         let v = DVec2::new;
         let middle = v(5.0, 5.0);
-        for gap in [5e-6, 1e-4, 0.009] {
+        for gap in [5e-6, 1e-4, 0.009, 0.1, 1.5] {
             // Two meet in the middle, the third begins beside it, on what would be the first one's way.
             let lines = [[v(5.0, 11.0), middle], [v(-1.0, 4.0), middle], [v(5.0, 5.0 - gap), v(11.0, 4.5)]];
-            let regions = cut(v(0., 0.), v(10., 10.), lines.into_iter());
+            let regions = cut([v(0., 0.), v(10., 10.)], lines.into_iter(), |_| gap);
             let mut areas: Vec<f64> = regions.iter().map(area).filter(|a| *a > 1e-3).collect();
             areas.sort_by(f64::total_cmp);
             assert!(areas.len() == 3 && areas[2] < 50.0, "{gap}: {areas:?}");
@@ -265,7 +294,7 @@ mod tests {
         let merged = merged(&[square(0.0), square(1.0)]);
         assert_eq!((merged.len(), merged[0].len(), merged[0][0].len()), (1, 1, 4));
         assert!((area(&merged[0]) - 2.0).abs() < 1e-12);
-        let inside = point_inside(&merged[0]).unwrap();
+        let inside = points_inside(&merged[0])[0];
         assert!(inside.x > 0.1 && inside.x < 1.9 && inside.y > 0.1 && inside.y < 0.9);
     }
 }

@@ -5,8 +5,8 @@
 //! important ones cover is taken away. What covers it is itself drawn, or covered by something more
 //! important still, so nothing is lost.
 
-use super::crew::Crew;
 use super::Kind;
+use super::crew::Crew;
 use super::draw::Piece;
 use super::grid::{Grid, Places, Sorted};
 use glam::DVec2;

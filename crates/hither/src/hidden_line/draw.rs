@@ -9,7 +9,7 @@ use super::edges::Choice;
 use super::faces;
 use super::grid::Grid;
 use super::hatch;
-use super::intersections;
+use super::intersections::{self, Meeting};
 use super::lens::{HalfSpace, Lens};
 use super::occluders::Occluders;
 use super::shown::{Fate, Shown};
@@ -90,21 +90,18 @@ impl Preparation {
             cover: cover.as_ref(),
             picture,
             counts: options.hidden,
+            piercing: false,
         };
         let drawn = Choice::new(options.kinds, options.crease_angle, options.hidden);
-        // All lines bound faces, whichever of them are drawn.
-        let bounding = Kinds { marked: false, ..Kinds::ALL };
+        let mut pieces = trace_edges(&tracer, &drawn, options, &mut counters);
         let wants_faces = options.faces.is_some() || options.hatch.is_some();
-        let bounding = wants_faces.then(|| Choice::new(bounding, 0.0, options.hidden));
-        let [mut pieces, mut bounds] = trace_edges(&tracer, [Some(drawn), bounding], options, &mut counters);
-        let edges = pieces.len();
-        if options.kinds.intersection || options.kinds.contact || !shown.sections.is_empty() {
-            intersections::add(&tracer, &options.kinds, &mut pieces, &mut counters);
-        }
+        let kinds = if wants_faces { &Kinds::ALL } else { &options.kinds };
+        let meetings = intersections::find(&tracer, kinds, &mut counters);
+        intersections::add(&tracer, &meetings, &options.kinds, &mut pieces, &mut counters);
+        intersections::add_sections(&tracer, false, &mut pieces, &mut counters);
         let mut faces = Vec::new();
         if wants_faces {
-            add_meetings(&tracer, options, &pieces[edges..], &mut bounds, &mut counters);
-            bounds.retain(|piece| is_on_paper(piece, picture));
+            let bounds = bounds_of_faces(tracer, &meetings, options, &mut counters);
             faces = find_faces(&tracer, options, &bounds, &mut pieces);
         }
         pieces.retain(|piece| is_on_paper(piece, picture));
@@ -238,14 +235,13 @@ fn grid_over(placed: &[Placed], picture: DVec2, triangles: usize) -> Grid {
     Grid::over(min, max.max(min), side.clamp(8, MOST_CELLS))
 }
 
-/// Follows every edge that is to be drawn by either choice, once, and gives its parts to each that draws it. Lines are
-/// counted of the first.
+/// Follows every edge that is to be drawn.
 fn trace_edges(
     tracer: &Tracer,
-    choices: [Option<Choice>; 2],
+    choice: &Choice,
     options: &LineOptions,
     counters: &mut Counters,
-) -> [Vec<Piece>; 2] {
+) -> Vec<Piece> {
     let shown = tracer.shown;
     let mut work = Vec::new();
     for (s, solid) in shown.solids.iter().enumerate() {
@@ -256,19 +252,16 @@ fn trace_edges(
     let hides = |t: u32| !see_through(t);
     let trace = |scratch: &mut Scratch, (s, range): (usize, std::ops::Range<usize>)| {
         let solid = &shown.solids[s];
-        let mut pieces = [Vec::new(), Vec::new()];
+        let mut pieces = Vec::new();
         let mut lines = 0;
         for edge in &solid.topology.edges[range] {
-            let kinds = choices.each_ref().map(|c| c.as_ref()?.kind(shown, solid, edge));
-            if kinds == [None; 2] {
-                continue;
-            }
+            let Some(kind) = choice.kind(shown, solid, edge) else { continue };
             let Some(ends) = shown.edge(solid, edge.vertices) else { continue };
             let (p, q) = (shown.screen[ends[0] as usize], shown.screen[ends[1] as usize]);
             if (q - p).truncate() == DVec2::ZERO {
                 continue;
             }
-            lines += u64::from(kinds[0].is_some());
+            lines += 1;
             let places = edge.triangles.map(|t| shown.place(solid, t));
             let live = places.map(|t| t != NONE && is_live(shown, t) && hides(t));
             let sheet = |k: usize| if live[k] { shown.sheet(solid, places[k]) } else { None };
@@ -278,42 +271,36 @@ fn trace_edges(
                 sheets: [0, 1].map(|k| sheet(k).unwrap_or(NO_SHEET)),
             };
             tracer.trace([p, q], &own, scratch);
-            for (kind, pieces) in kinds.iter().zip(&mut pieces) {
-                if let Some(kind) = *kind {
-                    push_parts(pieces, p, q, solid.part, kind, scratch);
-                }
-            }
+            push_parts(&mut pieces, p, q, solid.part, kind, scratch);
         }
         (pieces, lines, std::mem::take(&mut scratch.tests))
     };
     let found = shown.crew.map_with(work, || Scratch::new(tracer.occluders), trace);
-    let mut all = [0, 1].map(|k| Vec::with_capacity(found.iter().map(|f| f.0[k].len()).sum()));
+    let mut all = Vec::with_capacity(found.iter().map(|f| f.0.len()).sum());
     for (pieces, lines, tests) in found {
-        all.iter_mut().zip(pieces).for_each(|(all, pieces)| all.extend(pieces));
+        all.extend(pieces);
         counters.lines += lines;
         counters.tests += tests;
     }
     all
 }
 
-/// Adds what bounds faces besides edges: meetings of surfaces, of which those of the kinds that are drawn have been
-/// `found`, and where planes cut.
-fn add_meetings(
-    tracer: &Tracer,
+/// The visible parts of all lines that bound faces, whichever of them are drawn. Only tests are counted.
+fn bounds_of_faces(
+    tracer: Tracer,
+    meetings: &[Meeting],
     options: &LineOptions,
-    found: &[Piece],
-    bounds: &mut Vec<Piece>,
     counters: &mut Counters,
-) {
-    if options.kinds.intersection && options.kinds.contact {
-        bounds.extend_from_slice(found);
-    } else {
-        let mut aside = Counters::default();
-        intersections::add(tracer, &Kinds::ALL, bounds, &mut aside);
-        counters.tests += aside.tests;
-        counters.pairs += aside.pairs;
-    }
-    intersections::add_sections(tracer, true, bounds, &mut Counters::default());
+) -> Vec<Piece> {
+    let tracer = Tracer { counts: false, piercing: true, ..tracer };
+    let choice = Choice::new(Kinds { marked: false, ..Kinds::ALL }, 0.0, options.hidden);
+    let mut counts = Counters::default();
+    let mut bounds = trace_edges(&tracer, &choice, options, &mut counts);
+    intersections::add(&tracer, meetings, &Kinds::ALL, &mut bounds, &mut counts);
+    intersections::add_sections(&tracer, true, &mut bounds, &mut counts);
+    counters.tests += counts.tests;
+    bounds.retain(|piece| is_on_paper(piece, tracer.picture));
+    bounds
 }
 
 /// The visible faces, if they are asked for, and hatching of them among the pieces.

@@ -14,6 +14,7 @@ use super::cover::Plane;
 use super::draw::Piece;
 use super::drawing::Face;
 use super::edges::FLAT;
+use super::occluders::Occluders;
 use super::shown::Shown;
 use super::topology::{Topology, trait_of};
 use super::trace::Tracer;
@@ -26,12 +27,11 @@ const LEAST_AREA: f64 = 1e-9;
 /// The faces that are seen, given the visible parts of all lines.
 pub(super) fn find(tracer: &Tracer, pieces: &[Piece], color: FaceColor) -> Vec<Face> {
     let visible = pieces.iter().filter(|p| p.covers == 0).map(|p| p.ends);
-    let regions = arrangement::cut(DVec2::ZERO, tracer.picture, visible);
+    let regions = arrangement::cut([DVec2::ZERO, tracer.picture], visible, |p| gap(tracer, p));
     let mut flats: HashMap<*const Topology, Vec<u32>> = HashMap::new();
     let mut groups: HashMap<Vec<Group>, Vec<Region>> = HashMap::new();
     for polygon in regions {
-        let Some(p) = arrangement::point_inside(&polygon) else { continue };
-        let seen = seen(tracer, p);
+        let seen = seen_in(tracer, &polygon);
         if !seen.is_empty() {
             let group = seen.iter().map(|&t| group_of(tracer.shown, t, &mut flats)).collect();
             groups.entry(group).or_default().push(Region { seen, polygon });
@@ -64,6 +64,19 @@ pub(super) fn find(tracer: &Tracer, pieces: &[Piece], color: FaceColor) -> Vec<F
     }
     faces.sort_by_key(|f| (f.part, f.cut, f.color, f.opacity.to_bits()));
     faces
+}
+
+/// How far apart, pixels, lines near a point may end that should meet. Where surfaces meet almost at an edge, the edge is
+/// seen up to where depths are the same but for rounding, and the meeting begins where they are the same.
+fn gap(tracer: &Tracer, p: DVec2) -> f64 {
+    /// The more the flatter surfaces are to each other and to the line of sight.
+    const TOLERANCES: f64 = 8.0;
+    let Occluders { grid, list, .. } = tracer.surfaces;
+    let nearest = tracer.surfaces.in_cell(grid.index(grid.column(p.x), grid.row(p.y))).first();
+    nearest.map_or(0.0, |&i| {
+        let lens = &tracer.shown.lens;
+        TOLERANCES * lens.tolerance * lens.pixels_per_metre(f64::from(list[i as usize].nearest))
+    })
 }
 
 /// A region of the paper, and the triangles that are seen in it, nearest first.
@@ -119,9 +132,32 @@ fn flat_runs(topology: &Topology) -> Vec<u32> {
     first
 }
 
-/// What is seen at a point, nearest first: surfaces that hide nothing, and the first that does, if there is
-/// one. Of several at the same depth that counts of the smallest part, then the first.
-fn seen(tracer: &Tracer, p: DVec2) -> Vec<u32> {
+/// What is seen in a region, nearest first: surfaces that hide nothing, and the first that does, if there is one. Where
+/// two of different parts are at the same depth, a place is looked for where one of them is before the other.
+fn seen_in(tracer: &Tracer, region: &Polygon) -> Vec<u32> {
+    /// Places that are tried.
+    const MOST_PLACES: usize = 24;
+    let part_of = |t: &u32| tracer.shown.part_of(*t);
+    let mut places = arrangement::points_inside(region).into_iter();
+    let Some(widest) = places.next() else { return Vec::new() };
+    let mut tied = Vec::new();
+    let first = seen(tracer, widest, &mut tied);
+    if tied.is_empty() {
+        return first;
+    }
+    // Where it is narrow a place may lie beside what is seen in the region: then it shows another part.
+    let decided = places.take(MOST_PLACES - 1).find_map(|p| {
+        let mut tied_here = Vec::new();
+        let seen = seen(tracer, p, &mut tied_here);
+        let is_one = seen.last().is_some_and(|t| tied.contains(&part_of(t)));
+        (tied_here.is_empty() && is_one).then_some(seen)
+    });
+    decided.unwrap_or(first)
+}
+
+/// What is seen at a point, nearest first. Of several at the same depth that counts of the smallest part, then the
+/// first; such of different parts are added to `tied`.
+fn seen(tracer: &Tracer, p: DVec2, tied: &mut Vec<u32>) -> Vec<u32> {
     let (shown, surfaces) = (tracer.shown, tracer.surfaces);
     let grid = &surfaces.grid;
     let mut best: Option<(f64, u32)> = None;
@@ -142,20 +178,34 @@ fn seen(tracer: &Tracer, p: DVec2) -> Vec<u32> {
         let w = Plane::through(a, b, c).at(p).clamp(farthest, nearest);
         if !tracer.hides(triangle) {
             through.push((w, triangle));
-        } else if best.is_none_or(|before| is_before(shown, p, (w, triangle), before)) {
+        } else if best.is_none_or(|before| is_before(shown, p, (w, triangle), before, tied)) {
             best = Some((best.map_or(w, |b| b.0.max(w)), triangle));
         }
     }
-    through.retain(|&surface| best.is_none_or(|best| is_before(shown, p, surface, best)));
+    through.retain(|&surface| best.is_none_or(|best| is_before(shown, p, surface, best, tied)));
     through.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     through.into_iter().chain(best).map(|s| s.1).collect()
 }
 
-/// Whether a surface at depth w counts before another one.
-fn is_before(shown: &Shown, p: DVec2, (w, triangle): (f64, u32), (before, other): (f64, u32)) -> bool {
+/// Whether a surface at depth w counts before another one. If they are at the same depth and of different parts, these
+/// are added to `tied`.
+fn is_before(
+    shown: &Shown,
+    p: DVec2,
+    (w, triangle): (f64, u32),
+    (before, other): (f64, u32),
+    tied: &mut Vec<u32>,
+) -> bool {
     let rank = |t: u32| (shown.part_of(t), t);
     let same = shown.lens.same_depth(shown.corners_in_view(triangle), p.extend(w));
-    if (w - before).abs() <= same { rank(triangle) < rank(other) } else { w > before }
+    if (w - before).abs() > same {
+        return w > before;
+    }
+    let (ours, theirs) = (rank(triangle), rank(other));
+    if ours.0 != theirs.0 {
+        tied.extend([ours.0, theirs.0]);
+    }
+    ours < theirs
 }
 
 /// The colour of a face, sRGB, and its opacity: surfaces over one another, nearest first.

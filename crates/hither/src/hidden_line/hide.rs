@@ -17,8 +17,15 @@ pub(super) struct Hidden {
 }
 
 /// The part of the line from `p` to `q` that `triangle` hides: where it is nearer by more than the lens's
-/// tolerance at one end of the part, and not farther by it at the other; else up to where they cross.
-pub(super) fn hidden_part(shown: &Shown, p: DVec3, q: DVec3, triangle: u32) -> Option<Hidden> {
+/// tolerance at one end of the part, and not farther by it at the other; else up to where they cross. With `piercing`
+/// up to there, too, if the triangle is farther by less than the tolerance.
+pub(super) fn hidden_part(
+    shown: &Shown,
+    p: DVec3,
+    q: DVec3,
+    triangle: u32,
+    piercing: bool,
+) -> Option<Hidden> {
     let corners = shown.corners(triangle);
     let inside = inside(p, q, &corners, shown.facing[triangle as usize])?;
     let depth = |end: &End| {
@@ -31,11 +38,17 @@ pub(super) fn hidden_part(shown: &Shown, p: DVec3, q: DVec3, triangle: u32) -> O
     if d0.abs() <= coarse || d1.abs() <= coarse {
         let in_view = shown.corners_in_view(triangle);
         // What is at the same place is neither before nor behind.
+        let (before0, before1) = (d0, d1);
         if d0.abs() <= shown.lens.same_depth(in_view, p + (q - p) * inside.0.t) {
             d0 = 0.0;
         }
         if d1.abs() <= shown.lens.same_depth(in_view, p + (q - p) * inside.1.t) {
             d1 = 0.0;
+        }
+        if piercing && d0 == 0.0 && d1 > 0.0 {
+            d0 = before0.min(0.0);
+        } else if piercing && d1 == 0.0 && d0 > 0.0 {
+            d1 = before1.min(0.0);
         }
     }
     let (from, to) = (inside.0.t, inside.1.t);

@@ -29,7 +29,7 @@ const CHUNK: usize = 1024;
 const PARALLEL: f64 = 1e-7;
 
 /// A line in which two triangles meet.
-struct Meeting {
+pub(super) struct Meeting {
     ends: [DVec3; 2],
     kind: Kind,
     triangles: [u32; 2],
@@ -37,19 +37,38 @@ struct Meeting {
     repeats: bool,
 }
 
-/// Finds the lines in which the live triangles meet, and those of sections; follows them, and adds their
-/// parts to `pieces`. Cost: the pairs of triangles that overlap on the paper and in depth.
-pub(super) fn add(tracer: &Tracer, kinds: &Kinds, pieces: &mut Vec<Piece>, counters: &mut Counters) {
-    let wanted = kinds.intersection || kinds.contact;
+/// Finds the lines of these kinds in which the live triangles meet.
+/// Cost: the pairs of triangles that overlap on the paper and in depth.
+pub(super) fn find(tracer: &Tracer, kinds: &Kinds, counters: &mut Counters) -> Vec<Meeting> {
+    if !kinds.intersection && !kinds.contact {
+        return Vec::new();
+    }
     let (crew, list) = (tracer.shown.crew, &tracer.surfaces.list);
     let mut planes = Vec::new();
-    if wanted {
-        crew.extend(&mut planes, list.len(), |i| Plane::of(tracer.shown, list[i].triangle));
-    }
-    let (meetings, pairs) = meetings(tracer, kinds, &planes);
+    crew.extend(&mut planes, list.len(), |i| Plane::of(tracer.shown, list[i].triangle));
+    let (mut meetings, pairs) = meetings(tracer, &planes);
+    meetings.retain(|m| is_wanted(m, kinds));
+    counters.pairs += pairs;
+    meetings
+}
+
+fn is_wanted(meeting: &Meeting, kinds: &Kinds) -> bool {
+    if meeting.kind == Kind::Intersection { kinds.intersection } else { kinds.contact }
+}
+
+/// Follows those meetings that are of these kinds, and adds their parts to `pieces`.
+pub(super) fn add(
+    tracer: &Tracer,
+    meetings: &[Meeting],
+    kinds: &Kinds,
+    pieces: &mut Vec<Piece>,
+    counters: &mut Counters,
+) {
+    let crew = tracer.shown.crew;
     let of_chunk = |scratch: &mut Scratch, chunk: &[Meeting]| {
-        let mut pieces = Vec::new();
-        for meeting in chunk {
+        let (mut pieces, mut lines) = (Vec::new(), 0);
+        for meeting in chunk.iter().filter(|m| is_wanted(m, kinds)) {
+            lines += 1;
             let [p, q] = meeting.ends.map(|e| tracer.shown.lens.project(e));
             if p.truncate() == q.truncate() {
                 continue;
@@ -68,24 +87,19 @@ pub(super) fn add(tracer: &Tracer, kinds: &Kinds, pieces: &mut Vec<Piece>, count
             let part = meeting.triangles.map(|t| tracer.shown.part_of(t));
             push_parts(&mut pieces, p, q, part[0].min(part[1]), meeting.kind, scratch);
         }
-        (pieces, std::mem::take(&mut scratch.tests))
+        (pieces, lines, std::mem::take(&mut scratch.tests))
     };
     let chunks = meetings.chunks(CHUNK).collect();
     let found = crew.map_with(chunks, || Scratch::new(tracer.occluders), of_chunk);
-    counters.lines += meetings.len() as u64;
-    counters.pairs += pairs;
-    for (more, tests) in found {
+    for (more, lines, tests) in found {
         pieces.extend(more);
+        counters.lines += lines;
         counters.tests += tests;
     }
-    add_sections(tracer, false, pieces, counters);
 }
 
-/// The meetings of the kinds that are wanted, each once, and how many pairs were tried for them.
-fn meetings(tracer: &Tracer, kinds: &Kinds, planes: &[Plane]) -> (Vec<Meeting>, u64) {
-    if planes.is_empty() {
-        return (Vec::new(), 0);
-    }
+/// All meetings, each once, and how many pairs were tried for them.
+fn meetings(tracer: &Tracer, planes: &[Plane]) -> (Vec<Meeting>, u64) {
     let flats = Flats::find(tracer.shown, tracer.surfaces, planes);
     let of_band = |band: usize| {
         let rows = tracer.surfaces.grid.rows;
@@ -98,10 +112,7 @@ fn meetings(tracer: &Tracer, kinds: &Kinds, planes: &[Plane]) -> (Vec<Meeting>, 
     let mut known: HashSet<[u32; 2], Mix> = HashSet::default();
     let pairs = found.iter().map(|band| band.1).sum();
     let mut all: Vec<Meeting> = found.into_iter().flat_map(|band| band.0).collect();
-    all.retain(|m| {
-        let wanted = if m.kind == Kind::Intersection { kinds.intersection } else { kinds.contact };
-        wanted && (!m.repeats || known.insert(m.triangles))
-    });
+    all.retain(|m| !m.repeats || known.insert(m.triangles));
     (all, pairs)
 }
 

@@ -70,6 +70,11 @@ impl Lens {
         DVec3::new(self.middle.x + p.x * scale, self.middle.y - p.y * scale, w)
     }
 
+    /// What a metre at right angles to the line of sight is on the paper at depth `w`.
+    pub fn pixels_per_metre(&self, w: f64) -> f64 {
+        if self.perspective { self.pixels_per_unit * w } else { self.pixels_per_unit }
+    }
+
     /// A projected point in view space.
     fn unproject(&self, p: DVec3) -> DVec3 {
         let (scale, z) = if self.perspective {

@@ -376,6 +376,38 @@ fn faces_are_what_rays_see_and_tile() {
 }
 
 #[test]
+fn faces_far_from_the_origin_are_those_of_the_same_scene_around_it() {
+    let moved = |scene: &Scene, by: f32| {
+        let mut scene = scene.clone();
+        scene.meshes.iter_mut().flat_map(|m| &mut m.positions).for_each(|p| *p += by);
+        scene
+    };
+    let draw = |scene: &Scene, mut view: View| {
+        (view.width, view.height) = (101, 83);
+        let options = LineOptions { faces: Some(super::FaceColor::White), kinds: Kinds::NONE, ..all_lines() };
+        Preparation::new(scene, &PrepareOptions::default()).draw(&view, &options).unwrap()
+    };
+    let (mut differ, mut all) = (0, 0);
+    for seed in 0..20 {
+        for far in [8192.0, 65536.0] {
+            // The same to the last bit but for where it is; what is far away is known less exactly.
+            let far_scene = moved(&scenes::rods(seed), far);
+            let near_scene = moved(&far_scene, -far);
+            for (near, far) in scenes::views(&near_scene).into_iter().zip(scenes::views(&far_scene)) {
+                let (near, far) = (draw(&near_scene, near), draw(&far_scene, far));
+                for (x, y) in (0..101).flat_map(|x| (0..83).map(move |y| (x, y))) {
+                    let p = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                    let part = |drawing| faces_at(drawing, p).first().map(|f| f.part);
+                    differ += usize::from(part(&near) != part(&far));
+                    all += 1;
+                }
+            }
+        }
+    }
+    assert!(differ * 10_000 < all, "{differ} of {all}");
+}
+
+#[test]
 fn the_faces_of_a_convex_body_are_as_large_as_its_outline() {
     let (positions, triangles) = scenes::cuboid([0.0; 3], [1.0, 0.7, 1.3]);
     let mut scene = Scene::new("box");

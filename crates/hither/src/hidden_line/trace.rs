@@ -24,6 +24,7 @@ pub(super) struct Part {
 }
 
 /// What tracing looks at.
+#[derive(Clone, Copy)]
 pub(super) struct Tracer<'a> {
     pub shown: &'a Shown<'a>,
     pub occluders: &'a Occluders,
@@ -36,6 +37,9 @@ pub(super) struct Tracer<'a> {
     pub picture: DVec2,
     /// Whether parts that are hidden are wanted, with the number of triangles that cover them.
     pub counts: bool,
+    /// Whether lines are seen as far as to where they pierce a surface, even if they are at the same place as it before,
+    /// but for rounding: so that lines that bound a face meet.
+    pub piercing: bool,
 }
 
 /// What tracing keeps from line to line; one for each thread.
@@ -212,7 +216,7 @@ impl Tracer<'_> {
         {
             return false;
         }
-        let least = a.z.min(b.z);
+        let (shown, least) = (self.shown, a.z.min(b.z));
         let reach = Bounds::around(min, max).reach();
         for row in cells.rows.0..=cells.rows.1 {
             for column in cells.columns.0..=cells.columns.1 {
@@ -232,7 +236,8 @@ impl Tracer<'_> {
                         continue;
                     }
                     scratch.tests += 1;
-                    let Some(hidden) = hidden_part(self.shown, line.p, line.q, occluder.triangle) else {
+                    let Some(hidden) = hidden_part(shown, line.p, line.q, occluder.triangle, self.piercing)
+                    else {
                         continue;
                     };
                     if scratch.hide(hidden) && stops {

@@ -106,8 +106,7 @@ fn what_lies_within_a_box_neither_shows_nor_costs() {
     let views = scenes::views(&scene);
     // The last eye is inside.
     for view in &views[..views.len() - 1] {
-        let (alone, full) =
-            (alone.draw(view, &all_lines()).unwrap(), full.draw(view, &all_lines()).unwrap());
+        let (alone, full) = (alone.draw(view, &all_lines()).unwrap(), full.draw(view, &all_lines()).unwrap());
         let difference = (alone.visible_length() - full.visible_length()).abs();
         assert!(difference < 1e-3, "{} and {}", alone.visible_length(), full.visible_length());
         // Six triangles of each box turn to the eye; not each is tried with each, in each cell.

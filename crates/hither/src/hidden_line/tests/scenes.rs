@@ -1,6 +1,7 @@
 //! Small scenes in which bodies pierce, touch, coincide and are open, and views of them.
 
 use crate::conventions::{Projection, View};
+use crate::reference::trouble;
 use crate::scene::{Content, Mesh, Node, Primitive, Scene, Transform};
 use glam::{DQuat, DVec3, Vec3};
 
@@ -125,6 +126,25 @@ pub fn bodies() -> Vec<(&'static str, Scene)> {
     add(&mut scene, "square", square, vec![[0, 1, 2], [0, 2, 3]], Transform::default());
     scenes.push(("sheets", scene));
     scenes
+}
+
+/// Rods that lie, slope a little, and pierce one another and two plates, at random.
+pub fn rods(seed: u64) -> Scene {
+    let random = &mut trouble::Random::new(seed);
+    let mut scene = Scene::new("rods");
+    add_box(&mut scene, "plate", [-4.0, -0.1, -4.0], [4.0, 0.1, 4.0]);
+    add_box(&mut scene, "plate", [-0.1, -4.0, -4.0], [0.1, 4.0, 4.0]);
+    for _ in 0..12 {
+        let (middle, along, width) = (random.point(3.0), random.point(3.0), random.point(0.4));
+        let corner = |k: usize| {
+            let side = |bit: usize| if k >> bit & 1 == 0 { -1.0 } else { 1.0 };
+            let across = along.cross(width).normalize_or_zero() * 0.2;
+            (middle + along * side(0) + width * side(1) + across * side(2)).as_vec3()
+        };
+        let (_, triangles) = cuboid([0.0; 3], [1.0; 3]);
+        add(&mut scene, "rod", (0..8).map(corner).collect(), triangles, Transform::default());
+    }
+    scene
 }
 
 /// Views from around, from a front where much coincides, from near and from inside.
