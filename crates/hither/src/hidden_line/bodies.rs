@@ -13,6 +13,7 @@
 
 use super::crew::Crew;
 use super::predicates::{counts_as_left, cross};
+use super::runs::Runs;
 use super::topology::{Edge, NONE, Topology};
 use glam::{DVec3, Vec3};
 
@@ -159,29 +160,13 @@ pub(super) struct Paper<'a> {
 
 /// For each triangle the first of those that hang together with it over edges.
 fn connected(neighbours: &[[u32; 3]]) -> Vec<u32> {
-    // Union–find; the first of a run is its root.
-    let mut parent: Vec<u32> = (0..neighbours.len() as u32).collect();
-    fn root(parent: &mut [u32], mut t: u32) -> u32 {
-        while parent[t as usize] != t {
-            parent[t as usize] = parent[parent[t as usize] as usize];
-            t = parent[t as usize];
-        }
-        t
-    }
+    let mut runs = Runs::new(neighbours.len());
     for t in 0..neighbours.len() as u32 {
-        let mut own = t;
-        for n in neighbours[t as usize] {
-            if n < t {
-                let other = root(&mut parent, n);
-                parent[own.max(other) as usize] = own.min(other);
-                own = own.min(other);
-            }
+        for n in neighbours[t as usize].into_iter().filter(|&n| n < t) {
+            runs.join(t, n);
         }
     }
-    for t in 0..parent.len() {
-        parent[t] = parent[parent[t] as usize];
-    }
-    parent
+    runs.firsts()
 }
 
 /// What is known of triangles that hang together.

@@ -15,6 +15,8 @@ use super::draw::Piece;
 use super::drawing::Face;
 use super::edges::FLAT;
 use super::occluders::Occluders;
+use super::regions::{self, Regions};
+use super::runs::Runs;
 use super::shown::Shown;
 use super::topology::{Topology, trait_of};
 use super::trace::Tracer;
@@ -27,42 +29,58 @@ const LEAST_AREA: f64 = 1e-9;
 /// The faces that are seen, given the visible parts of all lines.
 pub(super) fn find(tracer: &Tracer, pieces: &[Piece], color: FaceColor) -> Vec<Face> {
     let visible = pieces.iter().filter(|p| p.covers == 0).map(|p| p.ends);
-    let regions = arrangement::cut([DVec2::ZERO, tracer.picture], visible, |p| gap(tracer, p));
+    let crew = tracer.shown.crew;
+    let paper = [DVec2::ZERO, tracer.picture];
+    let mut regions = regions::cut(crew, paper, visible, |p| gap(tracer, p));
+    let all = std::mem::take(&mut regions.all);
+    let shares = crew.shares(all.len(), 16);
+    let seen = crew.map(shares, |range| all[range].iter().map(|r| seen_in(tracer, r)).collect::<Vec<_>>());
     let mut flats: HashMap<*const Topology, Vec<u32>> = HashMap::new();
     let mut groups: HashMap<Vec<Group>, Vec<Region>> = HashMap::new();
-    for polygon in regions {
-        let seen = seen_in(tracer, &polygon);
+    for (polygons, seen) in all.into_iter().zip(seen.into_iter().flatten()) {
         if !seen.is_empty() {
             let group = seen.iter().map(|&t| group_of(tracer.shown, t, &mut flats)).collect();
-            groups.entry(group).or_default().push(Region { seen, polygon });
+            groups.entry(group).or_default().push(Region { seen, polygons });
         }
     }
     let mut groups: Vec<(Vec<Group>, Vec<Region>)> = groups.into_iter().collect();
     groups.sort_by(|a, b| a.0.cmp(&b.0));
-    let mut faces = Vec::new();
-    for (group, mut parts) in groups {
-        let Some((last, through)) = group.split_last() else { continue };
-        // The same, whichever region was found first.
-        let layer = |k: usize| parts.iter().map(|p| p.seen[k]).min().unwrap_or_default();
-        let seen: Vec<u32> = (0..group.len()).map(layer).collect();
-        let (color, opacity) = shade(tracer, &seen, color);
-        let triangle = tracer.shown.mesh_triangle(seen[through.len()]);
-        let polygons: Vec<Polygon> = if parts.len() == 1 {
-            vec![parts.swap_remove(0).polygon]
-        } else {
-            arrangement::merged(&parts.into_iter().map(|p| p.polygon).collect::<Vec<_>>())
-        };
-        let through: Vec<u32> = through.iter().map(|g| g.part).collect();
-        for mut contours in polygons {
-            if area(&contours[0]) < LEAST_AREA {
-                continue;
-            }
-            contours.retain(|c| area(c) >= LEAST_AREA);
-            let (part, cut, through) = (last.part, last.cut, through.clone());
-            faces.push(Face { part, through, triangle, cut, color, opacity, contours });
-        }
-    }
+    let faces_of =
+        |(group, parts): (Vec<Group>, Vec<Region>)| faces_of(tracer, &regions, &group, parts, color);
+    let mut faces: Vec<Face> = crew.map(groups, faces_of).into_iter().flatten().collect();
     faces.sort_by_key(|f| (f.part, f.cut, f.color, f.opacity.to_bits()));
+    faces
+}
+
+/// The faces of a group: its regions, put together.
+fn faces_of(
+    tracer: &Tracer,
+    regions: &Regions,
+    group: &[Group],
+    parts: Vec<Region>,
+    color: FaceColor,
+) -> Vec<Face> {
+    let Some((last, through)) = group.split_last() else { return Vec::new() };
+    // The same, whichever region was found first.
+    let layer = |k: usize| parts.iter().map(|p| p.seen[k]).min().unwrap_or_default();
+    let seen: Vec<u32> = (0..group.len()).map(layer).collect();
+    let (color, opacity) = shade(tracer, &seen, color);
+    let triangle = tracer.shown.mesh_triangle(seen[through.len()]);
+    let through: Vec<u32> = through.iter().map(|g| g.part).collect();
+    let mut polygons: Vec<Polygon> = parts.into_iter().flat_map(|p| p.polygons).collect();
+    if polygons.len() > 1 {
+        polygons = arrangement::merged(&polygons);
+        polygons.iter_mut().flatten().for_each(|contour| regions.straighten(contour));
+    }
+    let mut faces = Vec::with_capacity(polygons.len());
+    for mut contours in polygons {
+        if area(&contours[0]) < LEAST_AREA {
+            continue;
+        }
+        contours.retain(|c| area(c) >= LEAST_AREA);
+        let (part, cut, through) = (last.part, last.cut, through.clone());
+        faces.push(Face { part, through, triangle, cut, color, opacity, contours });
+    }
     faces
 }
 
@@ -82,7 +100,7 @@ fn gap(tracer: &Tracer, p: DVec2) -> f64 {
 /// A region of the paper, and the triangles that are seen in it, nearest first.
 struct Region {
     seen: Vec<u32>,
-    polygon: Polygon,
+    polygons: Vec<Polygon>,
 }
 
 fn area(contour: &[DVec2]) -> f64 {
@@ -110,31 +128,21 @@ fn group_of(shown: &Shown, triangle: u32, flats: &mut HashMap<*const Topology, V
 
 /// For each triangle, the first of those that it lies in one plane with, from neighbour to neighbour.
 fn flat_runs(topology: &Topology) -> Vec<u32> {
-    let mut first: Vec<u32> = (0..topology.triangles.len() as u32).collect();
-    fn root(first: &mut [u32], mut t: u32) -> u32 {
-        while first[t as usize] != t {
-            first[t as usize] = first[first[t as usize] as usize];
-            t = first[t as usize];
-        }
-        t
-    }
+    let mut runs = Runs::new(topology.triangles.len());
     let flat = (2.0 * (FLAT * 0.5).sin().powi(2)) as f32;
     for edge in &topology.edges {
         let apart = edge.traits & (trait_of::NON_MANIFOLD | trait_of::BORDER) != 0;
         if !apart && edge.bend <= flat {
-            let [a, b] = edge.triangles.map(|t| root(&mut first, t));
-            first[a.max(b) as usize] = a.min(b);
+            let [a, b] = edge.triangles;
+            runs.join(a, b);
         }
     }
-    for t in 0..first.len() as u32 {
-        first[t as usize] = root(&mut first, t);
-    }
-    first
+    runs.firsts()
 }
 
 /// What is seen in a region, nearest first: surfaces that hide nothing, and the first that does, if there is one. Where
 /// two of different parts are at the same depth, a place is looked for where one of them is before the other.
-fn seen_in(tracer: &Tracer, region: &Polygon) -> Vec<u32> {
+fn seen_in(tracer: &Tracer, region: &[Polygon]) -> Vec<u32> {
     /// Places that are tried.
     const MOST_PLACES: usize = 24;
     let part_of = |t: &u32| tracer.shown.part_of(*t);
