@@ -90,10 +90,16 @@ fn meeting(lines: impl Iterator<Item = [DVec2; 2]>, gap: impl Fn(DVec2) -> f64) 
     let mut ends = Ends::default();
     let mut named: Vec<[u32; 2]> = lines.map(|line| line.map(|end| ends.name(end))).collect();
     named.retain(|[a, b]| a != b);
-    let mut lines_at = vec![0u32; ends.points.len()];
-    named.iter().flatten().for_each(|&end| lines_at[end as usize] += 1);
-    let is_alone = |end: u32| lines_at[end as usize] == 1;
-    let mut all = bridges(&ends.points, is_alone, gap);
+    // For each end how many lines end there, and the other end of one of them.
+    let mut lines_at = vec![(0u32, 0u32); ends.points.len()];
+    for &[a, b] in &named {
+        for (end, other) in [(a, b), (b, a)] {
+            lines_at[end as usize] = (lines_at[end as usize].0 + 1, other);
+        }
+    }
+    let is_alone = |end: u32| lines_at[end as usize].0 == 1;
+    let other = |end: u32| is_alone(end).then_some(lines_at[end as usize].1);
+    let mut all = bridges(&ends.points, other, gap);
     for [a, b] in named {
         let [from, to] = [a, b].map(|end| ends.points[end as usize]);
         all.push([from, to]);
@@ -139,13 +145,22 @@ impl Ends {
     }
 }
 
-/// Lines from ends that are alone to those around them.
-fn bridges(ends: &[DVec2], is_alone: impl Fn(u32) -> bool, gap: impl Fn(DVec2) -> f64) -> Vec<[DVec2; 2]> {
+/// Lines from ends that are alone to those around them, `other` being the other end of the line of one that is alone.
+/// Of ends in the same direction only the nearest counts: lines over one another are cut endlessly.
+fn bridges(
+    ends: &[DVec2],
+    other: impl Fn(u32) -> Option<u32>,
+    gap: impl Fn(DVec2) -> f64,
+) -> Vec<[DVec2; 2]> {
     /// Of the ends in a cell no more are looked at.
     const MOST_IN_CELL: usize = 64;
-    let alone = ends.iter().enumerate().filter(|&(i, _)| is_alone(i as u32));
-    let mut alone: Vec<(u32, f64)> =
-        alone.map(|(i, &end)| (i as u32, gap(end).clamp(BRIDGED, FARTHEST_BRIDGED))).collect();
+    /// The cosine between directions that are the same.
+    const SAME_WAY: f64 = 0.999;
+    let at = |end: u32| ends[end as usize];
+    let way = |from: u32, to: u32| (at(to) - at(from)).normalize_or_zero();
+    let alone = (0..ends.len() as u32).filter_map(|end| Some((end, way(end, other(end)?))));
+    let mut alone: Vec<(u32, f64, DVec2)> =
+        alone.map(|(end, own)| (end, gap(at(end)).clamp(BRIDGED, FARTHEST_BRIDGED), own)).collect();
     let mut bridges = Vec::new();
     // Cells grow until there are enough ends in them, or none can be near enough.
     let mut side = BRIDGED;
@@ -158,24 +173,34 @@ fn bridges(ends: &[DVec2], is_alone: impl Fn(u32) -> bool, gap: impl Fn(DVec2) -
                 list.push(i as u32);
             }
         }
-        alone.retain(|&(i, gap)| {
-            let end = ends[i as usize];
-            let [x, y] = cell(end);
+        alone.retain(|&(i, gap, own)| {
+            let [x, y] = cell(at(i));
             let around = (0..9).filter_map(|k| in_cell.get(&[x + k % 3 - 1, y + k / 3 - 1])).flatten();
             let mut near: Vec<(f64, u32)> = around
-                .map(|&j| (ends[j as usize].distance(end), j))
+                .map(|&j| (at(j).distance(at(i)), j))
                 .filter(|&(distance, j)| j != i && distance <= gap.min(side))
                 .collect();
-            if near.len() < MOST_BRIDGES && gap > side {
+            near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+            let mut ways = vec![own];
+            let mut to = Vec::new();
+            for (_, j) in near {
+                let way = way(i, j);
+                if to.len() < MOST_BRIDGES && ways.iter().all(|w| w.dot(way) < SAME_WAY) {
+                    ways.push(way);
+                    to.push(j);
+                }
+            }
+            if to.len() < MOST_BRIDGES && gap > side {
                 return true;
             }
-            near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-            bridges.extend(near.iter().take(MOST_BRIDGES).map(|&(_, j)| [end, ends[j as usize]]));
+            bridges.extend(to.into_iter().map(|j| [i.min(j), i.max(j)]));
             false
         });
         side *= 4.0;
     }
-    bridges
+    bridges.sort_unstable();
+    bridges.dedup();
+    bridges.into_iter().map(|bridge| bridge.map(at)).collect()
 }
 
 /// A rectangle of the paper and the lines in it.
@@ -396,6 +421,16 @@ mod tests {
             let areas = areas(&regions, 1e-3);
             assert!(areas.len() == 3 && areas[2] < 50.0, "{gap}: {areas:?}");
         }
+    }
+
+    #[test]
+    fn bridges_do_not_lie_over_one_another() {
+        // Sixteen ends in a row, of lines that go away from it.
+        let at =
+            |k: u32, off: f64| DVec2::new(50.0, 30.0) + DVec2::from_angle(1.34) * (f64::from(k) * 0.05) + off;
+        let ends: Vec<DVec2> = (0..16).map(|k| at(k, 0.0)).chain((0..16).map(|k| at(k, 9.0))).collect();
+        let other = |end: u32| (end < 16).then_some(end + 16);
+        assert_eq!(bridges(&ends, other, |_| 2.0).len(), 15);
     }
 
     #[test]
