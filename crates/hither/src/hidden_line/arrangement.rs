@@ -1,4 +1,4 @@
-//! Polygons with holes: put together, filled, taken apart into triangles, looked into.
+//! Polygons with holes: cut out of the plane, put together, filled, taken apart into triangles, looked into.
 //!
 //! The work is `i_overlay`'s: coordinates go to a grid of 62-bit integers, crossings are snapped to it, and every
 //! predicate is exact.
@@ -81,6 +81,18 @@ pub(super) fn points_inside(polygons: &[Polygon]) -> Vec<DVec2> {
     place(0).chain(place(1)).chain(place(2)).collect()
 }
 
+/// The area of a polygon: of its outline less its holes.
+pub(super) fn area(polygon: &Polygon) -> f64 {
+    let mut areas = polygon.iter().map(|contour| area_within(contour));
+    areas.next().map_or(0.0, |outline| outline - areas.sum::<f64>())
+}
+
+/// The area within a contour.
+pub(super) fn area_within(contour: &[DVec2]) -> f64 {
+    let n = contour.len();
+    (0..n).map(|i| contour[i].perp_dot(contour[(i + 1) % n])).sum::<f64>().abs() * 0.5
+}
+
 /// Where a horizontal line is inside a polygon, from left to right.
 pub(super) fn stretches(polygon: &Polygon, y: f64) -> Vec<[f64; 2]> {
     let mut crossings = Vec::new();
@@ -99,13 +111,6 @@ pub(super) fn stretches(polygon: &Polygon, y: f64) -> Vec<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn area(polygon: &Polygon) -> f64 {
-        let twice = |c: &Vec<DVec2>| -> f64 {
-            (0..c.len()).map(|i| c[i].perp_dot(c[(i + 1) % c.len()])).sum::<f64>().abs()
-        };
-        (twice(&polygon[0]) - polygon[1..].iter().map(twice).sum::<f64>()) * 0.5
-    }
 
     #[test]
     fn a_polygon_with_holes_is_its_triangles() {

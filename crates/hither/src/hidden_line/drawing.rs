@@ -98,10 +98,7 @@ impl Face {
 
     /// Area without the holes, square pixels.
     pub fn area(&self) -> f64 {
-        let twice =
-            |c: &Vec<DVec2>| (0..c.len()).map(|i| c[i].perp_dot(c[(i + 1) % c.len()])).sum::<f64>().abs();
-        let mut areas = self.contours.iter().map(twice);
-        areas.next().map_or(0.0, |outer| (outer - areas.sum::<f64>()) * 0.5)
+        arrangement::area(&self.contours)
     }
 
     /// The face as triangles, for what cannot fill polygons with holes.

@@ -21,17 +21,17 @@ use super::shown::Shown;
 use super::topology::{Topology, trait_of};
 use super::trace::Tracer;
 use glam::{DVec2, DVec3, Vec3};
+use std::cmp::Ordering;
 use std::collections::HashMap;
 
 /// Contours of less area, square pixels, are rounding.
 const LEAST_AREA: f64 = 1e-9;
 
-/// The faces that are seen, given the visible parts of all lines.
-pub(super) fn find(tracer: &Tracer, pieces: &[Piece], color: FaceColor) -> Vec<Face> {
-    let visible = pieces.iter().filter(|p| p.covers == 0).map(|p| p.ends);
+/// The faces that are seen, given the visible parts of all lines that bound faces.
+pub(super) fn find(tracer: &Tracer, bounds: &[Piece], color: FaceColor) -> Vec<Face> {
     let crew = tracer.shown.crew;
     let paper = [DVec2::ZERO, tracer.picture];
-    let mut regions = regions::cut(crew, paper, visible, |p| gap(tracer, p));
+    let mut regions = regions::cut(crew, paper, bounds.iter().map(|piece| piece.ends), |p| gap(tracer, p));
     let all = std::mem::take(&mut regions.all);
     let shares = crew.shares(all.len(), 16);
     let seen = crew.map(shares, |range| all[range].iter().map(|r| seen_in(tracer, r)).collect::<Vec<_>>());
@@ -74,10 +74,10 @@ fn faces_of(
     }
     let mut faces = Vec::with_capacity(polygons.len());
     for mut contours in polygons {
-        if area(&contours[0]) < LEAST_AREA {
+        if arrangement::area_within(&contours[0]) < LEAST_AREA {
             continue;
         }
-        contours.retain(|c| area(c) >= LEAST_AREA);
+        contours.retain(|c| arrangement::area_within(c) >= LEAST_AREA);
         let (part, cut, through) = (last.part, last.cut, through.clone());
         faces.push(Face { part, through, triangle, cut, color, opacity, contours });
     }
@@ -101,11 +101,6 @@ fn gap(tracer: &Tracer, p: DVec2) -> f64 {
 struct Region {
     seen: Vec<u32>,
     polygons: Vec<Polygon>,
-}
-
-fn area(contour: &[DVec2]) -> f64 {
-    let n = contour.len();
-    (0..n).map(|i| contour[i].perp_dot(contour[(i + 1) % n])).sum::<f64>().abs() * 0.5
 }
 
 /// What is one face: a flat run of neighbours of one material.
@@ -186,30 +181,45 @@ fn seen(tracer: &Tracer, p: DVec2, tied: &mut Vec<u32>) -> Vec<u32> {
         let w = Plane::through(a, b, c).at(p).clamp(farthest, nearest);
         if !tracer.hides(triangle) {
             through.push((w, triangle));
-        } else if best.is_none_or(|before| is_before(shown, p, (w, triangle), before, tied)) {
-            best = Some((best.map_or(w, |b| b.0.max(w)), triangle));
+            continue;
+        }
+        let Some((before, other)) = best else {
+            best = Some((w, triangle));
+            continue;
+        };
+        match depth_order(shown, p, (w, triangle), before) {
+            Ordering::Less => {}
+            Ordering::Greater => {
+                tied.clear();
+                best = Some((w, triangle));
+            }
+            Ordering::Equal => {
+                if is_before_at_same_depth(shown, [triangle, other], tied) {
+                    best = Some((w.max(before), triangle));
+                }
+            }
         }
     }
-    through.retain(|&surface| best.is_none_or(|best| is_before(shown, p, surface, best, tied)));
+    through.retain(|&(w, triangle)| {
+        best.is_none_or(|(before, other)| match depth_order(shown, p, (w, triangle), before) {
+            Ordering::Equal => is_before_at_same_depth(shown, [triangle, other], tied),
+            order => order == Ordering::Greater,
+        })
+    });
     through.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     through.into_iter().chain(best).map(|s| s.1).collect()
 }
 
-/// Whether a surface at depth w counts before another one. If they are at the same depth and of different parts, these
-/// are added to `tied`.
-fn is_before(
-    shown: &Shown,
-    p: DVec2,
-    (w, triangle): (f64, u32),
-    (before, other): (f64, u32),
-    tied: &mut Vec<u32>,
-) -> bool {
-    let rank = |t: u32| (shown.part_of(t), t);
+/// Whether a surface at depth w is nearer (greater) than what is at depth `before`, at the same depth, or farther.
+fn depth_order(shown: &Shown, p: DVec2, (w, triangle): (f64, u32), before: f64) -> Ordering {
     let same = shown.lens.same_depth(shown.corners_in_view(triangle), p.extend(w));
-    if (w - before).abs() > same {
-        return w > before;
-    }
-    let (ours, theirs) = (rank(triangle), rank(other));
+    if (w - before).abs() <= same { Ordering::Equal } else { w.total_cmp(&before) }
+}
+
+/// Whether the first of two triangles at the same depth counts. If they are of different parts, these are added to
+/// `tied`.
+fn is_before_at_same_depth(shown: &Shown, triangles: [u32; 2], tied: &mut Vec<u32>) -> bool {
+    let [ours, theirs] = triangles.map(|t| (shown.part_of(t), t));
     if ours.0 != theirs.0 {
         tied.extend([ours.0, theirs.0]);
     }

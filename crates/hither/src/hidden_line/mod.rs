@@ -16,8 +16,8 @@
 //!    Signs that decide are exact ([Shewchuk 1997]); end points are crossings of lines, never samples.
 //! 4. `coincident` draws once what lies on one another; `joints` joins the rest into few long strokes, and `strokes`
 //!    puts these into an order.
-//! 5. If they are asked for, `regions` cuts the paper along all visible lines, tile by tile, and `faces` finds what each region
-//!    shows. `caps` closes what section planes open.
+//! 5. If faces are asked for, `regions` cuts the paper along all visible lines, tile by tile, and `faces` finds what
+//!    each region shows. `caps` closes what section planes open.
 //!
 //! What counts: a surface hides what is farther along the line of sight, whichever of its sides is seen.
 //! What is nearer to a surface than the *tolerance*, a few units in the last place of a coordinate in `f32` at
