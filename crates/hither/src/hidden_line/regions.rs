@@ -21,10 +21,10 @@ const LONGER: f64 = 1e-6;
 /// The side of the cells, pixels, in which all ends become one. More than rounding, less than [`LONGER`].
 const SAME: f64 = 1e-7;
 
-/// An end that is alone is joined to those that are so near, pixels, or nearer than the caller says.
+/// An end that is alone is joined to those that are so near, pixels, or farther if the caller says so.
 const BRIDGED: f64 = 0.01;
 
-/// The farthest that the caller may say, pixels.
+/// Whatever the caller says, ends that are farther apart are not joined, pixels.
 const FARTHEST_BRIDGED: f64 = 2.0;
 
 /// Of more ends around one that is alone no more than these are joined to it.
